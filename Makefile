@@ -1,0 +1,49 @@
+# The commands of this repository. Each is a few lines; the work is in tools/.
+#
+#   make render     render examples/cornell_box.blend to out/
+#   make test       lint and the test suite, on one Blender (make test BLENDER=4.5 for another)
+#   make test-all   the suite on every Blender this machine can run, on OpenGL and on Vulkan
+#   make lint       the linters alone
+#   make format     rewrite Python and GLSL the way lint wants them
+#   make package    dist/rebound-<version>.zip, to install in Blender
+#   make setup      only make the virtual environment
+#   make clean      remove everything made here, virtual environments included
+
+# Set-up needs a Python 3.11 or newer that runs (a pyenv shim on PATH may not).
+PYTHON ?= $(shell for python in python3 python3.13 python3.11 /usr/bin/python3 $(HOME)/.pyenv/versions/3.1[13]*/bin/python3; do \
+	"$$python" -c "import tomllib" 2>/dev/null && echo "$$python" && break; done)
+BLENDER ?=
+VENV := $(if $(BLENDER),.venv-$(BLENDER),.venv)
+
+.PHONY: render test test-all lint format package setup setup-render clean
+
+render: setup-render
+	@$(VENV)/bin/python tools/render_example.py
+
+test: lint
+	@$(VENV)/bin/python tools/run_tests.py
+
+test-all: python
+	@$(PYTHON) tools/test_all.py
+
+lint: setup
+	@$(VENV)/bin/python tools/lint.py
+
+format: setup
+	@$(VENV)/bin/python tools/lint.py --fix
+
+package: setup-render
+	@$(VENV)/bin/python tools/package.py
+
+setup: python
+	@$(PYTHON) tools/setup.py --for-tests --blender "$(BLENDER)"
+
+setup-render: python
+	@$(PYTHON) tools/setup.py --blender "$(BLENDER)"
+
+.PHONY: python
+python:
+	@test -n "$(PYTHON)" || { echo "make: needs Python 3.11 or 3.13 and found neither (Debian: apt-get install python3 python3-venv)"; exit 1; }
+
+clean:
+	rm -rf .venv .venv-* .cache out dist wheels .pytest_cache .ruff_cache .hypothesis .import_linter_cache
