@@ -1,0 +1,98 @@
+"""Blender camera or viewport region -> View, and the size and border of a final render."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .data import Array, View
+from .errors import SceneError
+
+Border = tuple[int, int, int, int]  # left, bottom, right, top in pixels of the full picture; right and top excluded
+
+
+def active_camera(depsgraph, engine=None):
+    """The evaluated camera that the picture is taken with. Raises SceneError where there is none."""
+    scene = depsgraph.scene_eval
+    camera = (engine and engine.camera_override) or scene.camera
+    if camera is None:
+        raise SceneError(f"Scene '{scene.name}' has no camera: add one, or make one active (View > Cameras > Set Active Object as Camera)")
+    if camera.type != "CAMERA":
+        raise SceneError(f"Scene '{scene.name}' looks through '{camera.name}', which is no camera: choose a camera in Scene Properties")
+    return camera.evaluated_get(depsgraph)
+
+
+def camera_warning(camera) -> str | None:
+    """One line if this camera can only be approximated."""
+    if camera.data.type in {"PANO", "CUSTOM"}:
+        return f"Camera '{camera.name}': its type {camera.data.type} is not supported; a perspective camera of its focal length stands in"
+    return None
+
+
+def render_size(render) -> tuple[int, int]:
+    """Full size of a final render in pixels, from bpy's RenderSettings, without its border."""
+    percent = render.resolution_percentage
+    return max(render.resolution_x * percent // 100, 1), max(render.resolution_y * percent // 100, 1)
+
+
+def border_pixels(render, width: int, height: int) -> Border | None:
+    """The render border in whole pixels, rounded as Blender does, or None where the whole picture is rendered."""
+    if not render.use_border:
+        return None
+    sides = (render.border_min_x, render.border_min_y, render.border_max_x, render.border_max_y)
+    # Blender multiplies in single precision and cuts the fraction off; one ulp more would shift the picture by a pixel.
+    x0, y0, x1, y1 = (int(np.float32(s) * np.float32(n)) for s, n in zip(sides, (width, height) * 2, strict=True))
+    if x1 <= x0 or y1 <= y0:
+        return None
+    return x0, y0, x1, y1
+
+
+def camera_view(camera, depsgraph, engine=None, *, width: int, height: int, border: Border | None = None) -> View:
+    """The view through an evaluated camera of a picture of width × height pixels, cut to ``border`` if there is one.
+
+    With an engine its camera matrix is used, which knows the eye of a stereo render. Raises SceneError if the camera's
+    transform has no inverse or is not finite.
+    """
+    render = depsgraph.scene_eval.render
+    projection = camera.calc_matrix_camera(
+        depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
+    )
+    world = np.array(engine.camera_model_matrix(camera) if engine else camera.matrix_world, np.float64).reshape(4, 4)
+    clip_from_view = np.array(projection, np.float64)
+    if border is not None:
+        clip_from_view = window_from_full(border, width, height) @ clip_from_view
+        width, height = border[2] - border[0], border[3] - border[1]
+    return View(_rigid_inverse(world, camera.name), clip_from_view, width, height)
+
+
+def region_view(region, region_data) -> View:
+    """The view of a 3D viewport region (``context.region`` and ``context.region_data``)."""
+    return View(
+        np.array(region_data.view_matrix, np.float64),
+        np.array(region_data.window_matrix, np.float64),
+        max(region.width, 1),
+        max(region.height, 1),
+    )
+
+
+def window_from_full(border: Border, width: int, height: int) -> Array:
+    """(4, 4) matrix from the clip space of the full picture to that of a part of it."""
+    x0, y0, x1, y1 = border
+    sx, sy = width / (x1 - x0), height / (y1 - y0)
+    matrix = np.diag((sx, sy, 1.0, 1.0))
+    matrix[0, 3] = sx - 2.0 * x0 / (x1 - x0) - 1.0
+    matrix[1, 3] = sy - 2.0 * y0 / (y1 - y0) - 1.0
+    return matrix
+
+
+def _rigid_inverse(world: Array, name: str) -> Array:
+    """The inverse of a camera's world matrix with its scale taken out, as Blender does."""
+    scale = np.linalg.norm(world[:3, :3], axis=0)
+    if not np.isfinite(world).all() or not (scale > 1e-20).all():
+        raise SceneError(f"Camera '{name}' has a zero scale or a transform that is not finite: reset its scale and location")
+    rigid = world.copy()
+    rigid[:3, :3] /= scale
+    if math.isclose(float(np.linalg.det(rigid[:3, :3])), 0.0, abs_tol=1e-6):
+        raise SceneError(f"Camera '{name}' is squashed flat by its parent's scale: clear the parent's scale")
+    return np.linalg.inv(rigid)

@@ -1,0 +1,141 @@
+"""What differs between two scenes: the only thing that decides what is uploaded and which light map is redrawn."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from .data import Array, Instance, Light, Scene
+
+
+def _no_boxes() -> Array:
+    return np.zeros((0, 2, 3), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """The differences from an older scene to a newer one; ``Changes.between`` makes it.
+
+    ``moved_bounds`` has one world-space box (lower, upper corner) for every place where the picture of some instance
+    may have changed: where a moved, edited, reassigned or recoloured instance was and where it now is, where an
+    added one is, where a removed one was. A light whose map sees none of these boxes keeps its map.
+    """
+
+    meshes_added: frozenset[Hashable] = frozenset()
+    meshes_removed: frozenset[Hashable] = frozenset()
+    images_added: frozenset[Hashable] = frozenset()
+    images_removed: frozenset[Hashable] = frozenset()
+    instances: bool = False  # an instance was added, removed, moved, hidden, given another mesh or material index
+    materials: bool = False  # the material table differs
+    lights: frozenset[Hashable] = frozenset()  # lights whose own data changed, added and removed ones included
+    world: bool = False
+    film: bool = False  # transparency or pixel filter
+    moved_bounds: Array = field(default_factory=_no_boxes)  # (n, 2, 3) float64, world space
+
+    @property
+    def geometry(self) -> bool:
+        """True where shapes or their places differ: meshes or instances."""
+        return self.instances or bool(self.meshes_added or self.meshes_removed)
+
+    @property
+    def images(self) -> bool:
+        """True where the set of images differs."""
+        return bool(self.images_added or self.images_removed)
+
+    @property
+    def any(self) -> bool:
+        """True where anything differs: the picture must be started anew."""
+        return self.geometry or self.images or self.materials or bool(self.lights) or self.world or self.film
+
+    @classmethod
+    def between(cls, old: Scene | None, new: Scene) -> Changes:
+        """Compare two scenes; ``old`` None stands for "nothing was there", so everything is new."""
+        first = old is None
+        before = Scene(materials=()) if old is None else old
+        pairs = tuple(_pair_instances(before, new))
+        return cls(
+            meshes_added=frozenset(new.meshes.keys() - before.meshes.keys()),
+            meshes_removed=frozenset(before.meshes.keys() - new.meshes.keys()),
+            images_added=frozenset(new.images.keys() - before.images.keys()),
+            images_removed=frozenset(before.images.keys() - new.images.keys()),
+            instances=any(not _same_instance(a, b) for a, b in pairs) or _order(before) != _order(new),
+            materials=before.materials != new.materials,
+            lights=_changed_lights(before, new),
+            world=first or before.world != new.world,
+            film=first
+            or before.film_transparent != new.film_transparent
+            or before.filter_width != new.filter_width,
+            moved_bounds=_moved_bounds(before, new, pairs),
+        )
+
+
+def _order(scene: Scene) -> list[Hashable]:
+    return [instance.key for instance in scene.instances]
+
+
+def _pair_instances(old: Scene, new: Scene) -> Iterator[tuple[Instance | None, Instance | None]]:
+    """Pair the instances of two scenes by key; the missing partner is None."""
+    remaining = {instance.key: instance for instance in old.instances}
+    for instance in new.instances:
+        yield remaining.pop(instance.key, None), instance
+    for instance in remaining.values():
+        yield instance, None
+
+
+def _same_instance(a: Instance | None, b: Instance | None) -> bool:
+    if a is b:
+        return True
+    if a is None or b is None:
+        return False
+    return (
+        a.mesh == b.mesh
+        and a.materials == b.materials
+        and a.visibility == b.visibility
+        and np.array_equal(a.world_from_object, b.world_from_object)
+    )
+
+
+def _changed_lights(old: Scene, new: Scene) -> frozenset[Hashable]:
+    before = {light.key: light for light in old.lights}
+    after = {light.key: light for light in new.lights}
+    changed = {key for key in before.keys() & after.keys() if not _same_light(before[key], after[key])}
+    return frozenset(changed | (before.keys() ^ after.keys()))
+
+
+def _same_light(a: Light, b: Light) -> bool:
+    return a is b or all(
+        np.array_equal(getattr(a, entry.name), getattr(b, entry.name))
+        if entry.name == "world_from_light"
+        else getattr(a, entry.name) == getattr(b, entry.name)
+        for entry in fields(Light)
+    )
+
+
+def _moved_bounds(old: Scene, new: Scene, pairs: tuple[tuple[Instance | None, Instance | None], ...]) -> Array:
+    boxes = []
+    for a, b in pairs:
+        if a is not None and b is not None and _same_instance(a, b) and _same_look(a, b, old, new):
+            continue
+        if a is not None and a.mesh in old.meshes:
+            boxes.append(world_bounds(a, old))
+        if b is not None and b.mesh in new.meshes:
+            boxes.append(world_bounds(b, new))
+    return np.array(boxes, np.float64).reshape(-1, 2, 3)
+
+
+def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:
+    """True if both instances wear equal materials, whatever their places in the two material tables."""
+    if old.materials is new.materials:
+        return a.materials == b.materials
+    return [old.materials[i] for i in a.materials] == [new.materials[i] for i in b.materials]
+
+
+def world_bounds(instance: Instance, scene: Scene) -> Array:
+    """The world-space box of an instance: (2, 3) float64, of its object-space box's eight corners."""
+    bounds = np.asarray(scene.meshes[instance.mesh].bounds, np.float64)
+    matrix = instance.world_from_object
+    center = matrix[:3, :3] @ bounds.mean(axis=0) + matrix[:3, 3]
+    half = np.abs(matrix[:3, :3]) @ (bounds[1] - bounds[0]) * 0.5
+    return np.stack((center - half, center + half))

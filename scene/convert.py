@@ -1,0 +1,165 @@
+"""Depsgraph -> Scene: the only door from Blender's data into Rebound's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+import numpy as np
+
+from .cameras import camera_warning
+from .data import Array, Instance, Light, Mesh, Scene, Visibility
+from .errors import SceneError
+from .images import ImageReader
+from .lights import read_light
+from .materials import MaterialTable, read_world
+from .meshes import mesh_key, read_mesh
+
+__all__ = ["SceneError", "convert_scene"]
+
+
+def convert_scene(
+    depsgraph,
+    *,
+    for_viewport: bool,
+    view_layer=None,
+    previous: Scene | None = None,
+    visible: Callable[[object], bool] | None = None,
+) -> Scene:
+    """Read everything that a frame needs from an evaluated depsgraph.
+
+    ``previous`` is an older scene of the same session: meshes and images whose key did not change are taken from it,
+    as the same objects. ``visible`` is asked about each original object (the instancer, for an instance) and hides
+    what it declines; a viewport passes its local view there. ``view_layer`` defaults to the depsgraph's own.
+    What cannot be read stands in Scene.warnings; nothing is raised for it.
+    """
+    reader = _SceneReader(depsgraph, for_viewport, view_layer, previous or Scene(), visible)
+    for instance in depsgraph.object_instances:
+        reader.add(instance)
+    return reader.scene()
+
+
+class _SceneReader:
+    """Collects one scene while the depsgraph's instances go by; nothing of Blender's is kept past one of them."""
+
+    def __init__(self, depsgraph, for_viewport, view_layer, previous, visible):
+        self.depsgraph = depsgraph
+        self.for_viewport = for_viewport
+        self.view_layer = view_layer or depsgraph.view_layer_eval
+        self.previous = previous
+        self.visible = visible
+        self.warnings: dict[str, None] = {}  # an ordered set: each line once
+        self.images = ImageReader(previous.images, self.warn)
+        self.materials = MaterialTable(self.images, self.warn, frame=depsgraph.scene_eval.frame_current)
+        self.meshes: dict[Hashable, Mesh] = {}
+        self.empty: set[Hashable] = set()
+        self.instances: list[Instance] = []
+        self.lights: list[Light] = []
+        self.keys: set[Hashable] = set()
+
+    def warn(self, line: str) -> None:
+        self.warnings[line] = None
+
+    def add(self, instance) -> None:
+        """Take in one item of depsgraph.object_instances."""
+        obj = instance.object
+        # A curve, text, surface or metaball comes a second time, as an instance of its evaluated mesh.
+        if obj.type not in {"MESH", "LIGHT"} or not instance.show_self:
+            return
+        parent = instance.parent if instance.is_instance else obj
+        if self.visible is not None and not self.visible(parent.original):
+            return
+        matrix = np.array(instance.matrix_world, np.float64)
+        if not np.isfinite(matrix).all():
+            self.warn(f"Object '{obj.name}': its transform is not finite; it is left out")
+            return
+        key = self._unique_key(instance, obj, parent)
+        if obj.type == "LIGHT":
+            light = read_light(obj, matrix, key, self.warn)
+            if light is not None:
+                self.lights.append(light)
+            return
+        self._add_mesh(obj, parent, matrix, key)
+
+    def _add_mesh(self, obj, parent, matrix: Array, key: Hashable) -> None:
+        visibility = self._visibility(obj, parent)
+        if not visibility:
+            return
+        mesh = self._mesh(obj)
+        if mesh is None:
+            return
+        slots = self._materials(obj, mesh)
+        self.instances.append(Instance(key, mesh.key, slots, matrix, visibility))
+
+    def _mesh(self, obj) -> Mesh | None:
+        """The mesh of an object: one met before, one of the previous scene, or read now. None if nothing is to be drawn."""
+        data = obj.data
+        key = mesh_key(data)
+        if key in self.meshes or key in self.empty:
+            return self.meshes.get(key)
+        mesh = self.previous.meshes.get(key)
+        if mesh is None:
+            mesh = self._read(obj, key)
+        if mesh is None:
+            self.empty.add(key)
+        else:
+            self.meshes[key] = mesh
+        return mesh
+
+    def _read(self, obj, key: Hashable) -> Mesh | None:
+        reading = read_mesh(obj.data, key)
+        if reading.bad_triangles:
+            self.warn(
+                f"Object '{obj.name}': {reading.bad_triangles} triangles have corners that are not finite; they are left out"
+            )
+        return reading.mesh
+
+    def _materials(self, obj, mesh: Mesh) -> tuple[int, ...]:
+        """Material indices by slot, at least as many as the mesh's slots reach."""
+        slots = [self.materials.index(slot.material) for slot in obj.material_slots] or [0]
+        missing = mesh.slots[-1][0] + 1 - len(slots)
+        return tuple(slots + [slots[-1]] * max(missing, 0))
+
+    def _visibility(self, obj, parent) -> Visibility:
+        """What an object takes part in; an instance needs its instancer's leave as well, as in Cycles."""
+        camera = obj.visible_camera and parent.visible_camera
+        shadow = obj.visible_shadow and parent.visible_shadow
+        bounce = obj.visible_diffuse and parent.visible_diffuse
+        holdout = parent.holdout_get(view_layer=self.view_layer) or obj.is_holdout
+        if not holdout and parent.indirect_only_get(view_layer=self.view_layer):
+            camera = False
+        flags = Visibility(0)
+        for wanted, flag in ((camera, Visibility.CAMERA), (shadow, Visibility.SHADOW), (bounce, Visibility.BOUNCE)):
+            flags |= flag if wanted else Visibility(0)
+        if holdout and camera:
+            flags |= Visibility.HOLDOUT
+        return flags
+
+    def _unique_key(self, instance, obj, parent) -> Hashable:
+        """A key that stays while objects are moved and edited: who places whom, and the place's number."""
+        key: tuple = (parent.original.session_uid,)
+        if instance.is_instance:
+            key = (*key, obj.original.session_uid, *instance.persistent_id)
+        while key in self.keys:
+            key = (*key, -1)
+        self.keys.add(key)
+        return key
+
+    def scene(self) -> Scene:
+        """The finished scene."""
+        scene = self.depsgraph.scene_eval
+        if scene.camera is not None and scene.camera.type == "CAMERA":
+            line = camera_warning(scene.camera)
+            if line and not self.for_viewport:
+                self.warn(line)
+        world = read_world(scene.world, self.warn)
+        return Scene(
+            meshes=self.meshes,
+            instances=tuple(self.instances),
+            materials=self.materials.finish(),
+            images=self.images.images,
+            lights=tuple(self.lights),
+            world=world,
+            film_transparent=bool(scene.render.film_transparent),
+            filter_width=float(scene.render.filter_size),
+            warnings=tuple(self.warnings),
+        )

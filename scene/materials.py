@@ -1,0 +1,286 @@
+"""Blender material and world -> Material and World: base colour, emission and image textures of the common shaders.
+
+The full node graph is to be compiled in place of this file; what it must offer is `MaterialTable` and `read_world`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from .data import Material, Texture, World
+from .images import ImageReader
+from .nodes import (
+    RGB,
+    Socket,
+    active_output,
+    constant,
+    default_rgb,
+    find_input,
+    linked_groups,
+    mean,
+    node_tree,
+    source,
+    strength_and_color,
+)
+
+BLACK: RGB = (0.0, 0.0, 0.0)
+MAGENTA: RGB = (1.0, 0.0, 1.0)  # Blender's colour for a missing image
+GREY: RGB = (0.8, 0.8, 0.8)
+
+# Shaders shown as a diffuse surface of their colour input for now.
+STAND_INS = {
+    "ShaderNodeBsdfAnisotropic": "Color",
+    "ShaderNodeBsdfGlossy": "Color",
+    "ShaderNodeBsdfGlass": "Color",
+    "ShaderNodeBsdfRefraction": "Color",
+    "ShaderNodeBsdfMetallic": "Base Color",
+    "ShaderNodeBsdfSheen": "Color",
+    "ShaderNodeBsdfVelvet": "Color",
+    "ShaderNodeBsdfToon": "Color",
+    "ShaderNodeBsdfTranslucent": "Color",
+    "ShaderNodeSubsurfaceScattering": "Color",
+    "ShaderNodeEeveeSpecular": "Base Color",
+}
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A colour, or an image that replaces it."""
+
+    rgb: RGB
+    texture: Texture | None = None
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What is read of one shader: how it reflects and what it emits."""
+
+    base: Paint = Paint(BLACK)
+    emission: Paint = Paint(BLACK)
+
+
+@dataclass
+class MaterialTable:
+    """Indices for materials in the order they are met; index 0 is what a face without a material wears."""
+
+    images: ImageReader
+    warn: Callable[[str], None]
+    frame: int = 0
+    materials: list[Material] = field(default_factory=lambda: [Material("Default")])
+    _index: dict[int, int] = field(default_factory=dict)
+    _metallic: list[str] = field(default_factory=list)
+
+    def index(self, material) -> int:
+        """The index of a bpy material (None: the default), which is read when it is first met."""
+        if material is None:
+            return 0
+        uid = (material.original or material).session_uid
+        if uid not in self._index:
+            reader = _Reader(material.name, self)
+            self.materials.append(reader.material(material))
+            self._index[uid] = len(self.materials) - 1
+        return self._index[uid]
+
+    def note_metallic(self, name: str) -> None:
+        if name not in self._metallic:
+            self._metallic.append(name)
+
+    def finish(self) -> tuple[Material, ...]:
+        """The table; gives the warnings that are counted over the scene."""
+        if self._metallic:
+            names = ", ".join(f"'{name}'" for name in self._metallic[:3])
+            more = ", …" if len(self._metallic) > 3 else ""
+            self.warn(f"{len(self._metallic)} materials are metallic, which is shown as diffuse for now: {names}{more}")
+        return tuple(self.materials)
+
+
+class _Reader:
+    """Reads one material; at most one warning line for it."""
+
+    def __init__(self, name: str, table: MaterialTable):
+        self.name = name
+        self.table = table
+        self.problems: list[str] = []
+
+    def material(self, material) -> Material:
+        tree = node_tree(material)
+        if tree is None:
+            return Material(self.name, base_color=tuple(material.diffuse_color[:3]))
+        output = active_output(tree)
+        surface = find_input(output, "Surface") if output else None
+        if surface is None or not surface.socket.is_linked:
+            return Material(self.name, base_color=BLACK)  # as in Cycles: nothing is reflected
+        read = self.surface(surface)
+        if self.problems:
+            self.table.warn(f"Material '{self.name}': {'; '.join(dict.fromkeys(self.problems))}")
+        return Material(
+            self.name,
+            base_color=read.base.rgb,
+            base_color_texture=read.base.texture,
+            emission=read.emission.rgb,
+            emission_texture=read.emission.texture,
+        )
+
+    def problem(self, text: str) -> None:
+        self.problems.append(text)
+
+    # Shaders
+
+    def surface(self, socket: Socket, depth: int = 0) -> Surface:
+        found = source(socket)
+        if not found.socket.is_output:
+            return Surface()
+        kind = found.node.bl_idname
+        if depth > 32:
+            self.problem("its shader tree is too deep")
+            return Surface(Paint(GREY))
+        if kind == "ShaderNodeBsdfPrincipled":
+            return self.principled(found)
+        if kind == "ShaderNodeBsdfDiffuse":
+            return Surface(base=self.paint(found.input("Color")))
+        if kind == "ShaderNodeEmission":
+            return Surface(emission=self.emission(found, "Color", "Strength"))
+        if kind == "ShaderNodeMixShader":
+            return self.mix(found, depth)
+        if kind == "ShaderNodeAddShader":
+            a, b = (self.surface(Socket(s, found.groups), depth + 1) for s in found.node.inputs)
+            return self.sum(a, 1.0, b, 1.0)
+        return self.stand_in(found)
+
+    def principled(self, found: Socket) -> Surface:
+        metallic = found.input("Metallic")
+        value = metallic and constant(metallic)
+        if value and mean(value) > 0.0:
+            self.table.note_metallic(self.name)
+        emission = self.emission(found, "Emission Color", "Emission Strength")
+        return Surface(self.paint(found.input("Base Color")), emission)
+
+    def emission(self, found: Socket, color: str, strength: str) -> Paint:
+        factor = mean(self.number(found.input(strength)))
+        if factor == 0.0:
+            return Paint(BLACK)
+        paint = self.paint(found.input(color))
+        rgb = (1.0, 1.0, 1.0) if paint.texture else paint.rgb
+        return Paint(tuple(c * factor for c in rgb), paint.texture)
+
+    def mix(self, found: Socket, depth: int) -> Surface:
+        factor, first, second = (Socket(s, found.groups) for s in found.node.inputs[:3])
+        value = constant(factor)
+        weight = 0.5 if value is None else min(max(mean(value), 0.0), 1.0)
+        if value is None:
+            self.problem(f"node '{source(factor).node.name}' as a mix factor is not read yet, both shaders count half")
+        a = self.surface(first, depth + 1) if weight < 1.0 else Surface()
+        b = self.surface(second, depth + 1) if weight > 0.0 else Surface()
+        return self.sum(a, 1.0 - weight, b, weight)
+
+    def sum(self, a: Surface, wa: float, b: Surface, wb: float) -> Surface:
+        base = self.sum_paint(a.base, wa, b.base, wb, multiplies=False)
+        return Surface(
+            replace(base, rgb=tuple(min(c, 1.0) for c in base.rgb)),
+            self.sum_paint(a.emission, wa, b.emission, wb, multiplies=True),
+        )
+
+    def sum_paint(self, a: Paint, wa: float, b: Paint, wb: float, multiplies: bool) -> Paint:
+        """A weighted sum. Only one image survives, that of the heavier shader; an image that ``multiplies`` keeps its weight."""
+        if a.texture is None and b.texture is None:
+            return Paint(tuple(wa * x + wb * y for x, y in zip(a.rgb, b.rgb, strict=True)))
+        (heavy, weight), (light, _) = ((a, wa), (b, wb)) if (a.texture is not None, wa) >= (b.texture is not None, wb) else ((b, wb), (a, wa))
+        if light.texture is not None or any(light.rgb) or weight != 1.0 and not multiplies:
+            self.problem("a mix of shaders shows only the image of one of them")
+        return Paint(tuple(c * weight for c in heavy.rgb) if multiplies else heavy.rgb, heavy.texture)
+
+    def stand_in(self, found: Socket) -> Surface:
+        node = found.node
+        name = STAND_INS.get(node.bl_idname)
+        color = found.input(name) if name else None
+        if color is not None:
+            self.problem(f"node '{node.name}' is shown as diffuse for now")
+            return Surface(base=self.paint(color))
+        if node.bl_idname in {"ShaderNodeBsdfTransparent", "ShaderNodeHoldout"}:
+            self.problem(f"node '{node.name}' is not shown yet, it reflects nothing")
+            return Surface()
+        self.problem(f"node '{node.name}' is not read yet, grey is shown")
+        return Surface(Paint(GREY))
+
+    # Colours
+
+    def number(self, socket: Socket | None) -> RGB:
+        if socket is None:
+            return BLACK
+        value = constant(socket)
+        if value is None:
+            self.unread(source(socket))
+            return default_rgb(socket.socket)
+        return value
+
+    def paint(self, socket: Socket | None) -> Paint:
+        if socket is None:
+            return Paint(GREY)
+        found = source(socket)
+        if found.socket.is_output and found.node.bl_idname == "ShaderNodeTexImage" and not found.node.mute:
+            return self.image(found, socket)
+        return Paint(self.number(socket))
+
+    def unread(self, found: Socket) -> None:
+        self.problem(f"node '{found.node.name}' is not read yet, the socket's own value is shown")
+
+    def image(self, found: Socket, socket: Socket) -> Paint:
+        node = found.node
+        if found.socket.identifier == "Alpha":
+            self.unread(found)
+            return Paint(default_rgb(socket.socket))
+        if node.image is None:
+            return Paint(BLACK)  # as in Cycles: an Image Texture node without an image is black
+        key = self.table.images.read(node.image, self.table.frame)
+        if key is None:
+            return Paint(MAGENTA)
+        if node.projection != "FLAT":
+            self.problem(f"node '{node.name}' is projected by UV instead of {node.projection.lower()}")
+        if node.extension in {"CLIP", "MIRROR"}:
+            self.problem(f"node '{node.name}' extends its edge instead of {node.extension.lower()}")
+        texture = Texture(
+            key,
+            uv_map=self.uv_map(found.input("Vector")),
+            repeat=node.extension == "REPEAT",
+            closest=node.interpolation == "Closest",
+        )
+        return Paint(GREY, texture)
+
+    def uv_map(self, vector: Socket | None) -> str:
+        """The UV map behind an image's vector input; "" for the active one."""
+        found = vector and source(vector)
+        if not found or not found.socket.is_output:
+            return ""
+        if found.node.bl_idname == "ShaderNodeUVMap":
+            return found.node.uv_map
+        if found.node.bl_idname == "ShaderNodeTexCoord" and found.socket.identifier == "UV":
+            return ""
+        if found.node.bl_idname == "ShaderNodeMapping":
+            self.problem(f"node '{found.node.name}' is not read yet, the image is not moved or scaled")
+            return self.uv_map(found.input("Vector"))
+        self.problem(f"node '{found.node.name}' is not read yet, the image is laid by the active UV map")
+        return ""
+
+
+def read_world(world, warn: Callable[[str], None]) -> World:
+    """Read a bpy world (None: black). A texture is replaced by the socket's constant, with a warning."""
+    if world is None:
+        return World()
+    tree = node_tree(world)
+    if tree is None:
+        return World(tuple(world.color))
+    output = active_output(tree)
+    surface = find_input(output, "Surface") if output else None
+    if surface is None or not surface.socket.is_linked:
+        return World()
+    owner = f"World '{world.name}'"
+    found = source(surface)
+    if found.socket.is_output and found.node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
+        return World(strength_and_color(found, owner, "the socket's own value is shown", warn))
+    for node in linked_groups(tree):
+        if node.bl_idname == "ShaderNodeBackground":
+            warn(f"{owner}: node '{found.node.name}' is not read yet; its node '{node.name}' is shown alone")
+            return World(strength_and_color(Socket(node.outputs[0]), owner, "the socket's own value is shown", warn))
+    warn(f"{owner}: node '{found.node.name}' is not read yet; black is shown")
+    return World()
