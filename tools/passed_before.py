@@ -26,10 +26,9 @@ def tree_hash() -> str | None:
     return digest.hexdigest()
 
 
-def remember(key: str, outcome: dict[str, Any]) -> None:
-    """Note that suite `key` passed with `outcome`."""
-    tree = tree_hash()
-    if tree is None:
+def remember(key: str, outcome: dict[str, Any], tree: str | None) -> None:
+    """Note that suite `key` passed with `outcome` on `tree`, unless a file was changed while it ran."""
+    if tree is None or tree != tree_hash():
         return
     known = _load(tree) | {key: outcome}
     _FILE.parent.mkdir(exist_ok=True)

@@ -51,11 +51,11 @@ def run(blender: str, backend: str, suite: str) -> Outcome:
     report.unlink(missing_ok=True)
     print(f"\n=== Blender {blender}, {backend}, suite {suite}", flush=True)
     command = [venv_python(blender), "-m", "pytest", "--quiet", f"--junitxml={report}", *SUITES[suite]]
-    start = time.monotonic()
+    tree, start = passed_before.tree_hash(), time.monotonic()
     status = subprocess.run(command, cwd=ROOT, env=os.environ | {"REBOUND_TEST_BACKEND": backend}).returncode
     outcome = _read(report, status, time.monotonic() - start)
     if outcome.failed == 0:
-        passed_before.remember(f"{blender}/{backend}/{suite}", asdict(outcome))
+        passed_before.remember(f"{blender}/{backend}/{suite}", asdict(outcome), tree)
     return outcome
 
 

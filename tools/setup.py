@@ -115,7 +115,7 @@ def set_up(blender: str, for_tests: bool) -> None:
 
 def main() -> None:
     """Set up the one environment asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Make the virtual environment of one Blender version.")
     parser.add_argument("--blender", help="4.5, 5.0 or 5.2; default: the newest this machine can run")
     parser.add_argument("--for-tests", action="store_true", help="also what lint and the Vulkan tests need")
     arguments = parser.parse_args()
