@@ -74,7 +74,7 @@ class _SceneReader:
             return
         key = self._unique_key(instance, obj, parent)
         if obj.type == "LIGHT":
-            light = read_light(obj, matrix, key, self.warn)
+            light = read_light(obj, matrix, key, obj.visible_diffuse and parent.visible_diffuse, self.warn)
             if light is not None:
                 self.lights.append(light)
             return

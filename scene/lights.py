@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 
 import numpy as np
@@ -9,59 +10,85 @@ import numpy as np
 from .data import AreaShape, Array, Light, LightKind
 from .nodes import light_emission, node_tree
 
+MIN_SPREAD = math.radians(1.0)  # Blender allows 0, a laser that no grid of samples would ever hit
+ROUND_SHAPES = {AreaShape.DISK, AreaShape.ELLIPSE}
 
-def read_light(obj, matrix: Array, key: Hashable, warn: Callable[[str], None]) -> Light | None:
+
+def read_light(obj, matrix: Array, key: Hashable, lights_diffuse: bool, warn: Callable[[str], None]) -> Light | None:
     """Read an evaluated light object; None for a light that gives no light.
 
     ``matrix`` is the (4, 4) world matrix of this very instance: a light inside a collection has several.
+    ``lights_diffuse`` is the ray visibility of the object and its instancer: Cycles' switch, where ``diffuse_factor``
+    is Blender's slider.
     """
     light = obj.data
-    power = light_power(light, warn)
-    if not any(value > 0.0 for value in power):
-        return None
     kind = LightKind(light.type)
-    common = dict(
+    if _is_portal(light) or (kind is not LightKind.POINT and not np.linalg.norm(matrix[:3, :3], axis=0).all()):
+        return None
+    shape = _shape(light, kind)
+    power = light_power(light, kind, matrix, warn)
+    if not any(power):
+        return None
+    return Light(
         key=key,
         name=obj.name,
         kind=kind,
         power=power,
         world_from_light=matrix,
         casts_shadow=bool(light.use_shadow),
-        # Cycles lights diffuse surfaces or not, it knows no factor: the ray visibility is the switch, Blender's slider scales.
-        diffuse_factor=float(light.diffuse_factor) if obj.visible_diffuse else 0.0,
+        diffuse_factor=float(light.diffuse_factor) if lights_diffuse else 0.0,
+        **shape,
     )
-    return Light(**common, **_shape(light, kind))
 
 
-def light_power(light, warn: Callable[[str], None]) -> tuple[float, float, float]:
+def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], None]) -> tuple[float, float, float]:
     """RGB power of a bpy light: energy, colour, temperature, exposure, nodes, and its size where it is not normalised."""
     color = np.array(light.color, np.float64)
     if light.use_temperature:
         color *= np.array(light.temperature_color, np.float64)
-    power = color * light.energy * 2.0**light.exposure * _size_factor(light)
+    power = color * light.energy * 2.0**light.exposure
+    if not light.normalize:
+        power *= normalization(light, kind, matrix)
     tree = node_tree(light)
     if tree is not None:
         power *= np.array(light_emission(light.name, tree, warn))
-    if not np.isfinite(power).all():
-        warn(f"Light '{light.name}': its power is not a finite number; it is left out")
+    if not np.isfinite(power).all() or (power < 0.0).any():
+        warn(f"Light '{light.name}': its power is negative or not a number; it is left out")
         return (0.0, 0.0, 0.0)
     return tuple(float(value) for value in power)
 
 
-def _size_factor(light) -> float:
-    """1 for a light whose power does not depend on its size (the default)."""
-    return 1.0
+def normalization(light, kind: LightKind, matrix: Array) -> float:
+    """What Cycles divides a normalised light's power by: by this much an absolute light of the same look is stronger."""
+    if kind is LightKind.SUN:
+        half = light.angle / 2.0
+        return math.pi * math.sin(half) ** 2 if half > 0.0 else 1.0
+    if kind is LightKind.AREA:
+        width, height = _area_size(light)
+        scale = np.linalg.norm(matrix[:3, :2], axis=0)
+        area = width * height * float(scale[0] * scale[1])
+        return area * math.pi / 4.0 if AreaShape(light.shape) in ROUND_SHAPES else area
+    area = 4.0 * math.pi * light.shadow_soft_size**2  # the object's scale does not count
+    return area if area > 0.0 else 4.0
+
+
+def _area_size(light) -> tuple[float, float]:
+    square = AreaShape(light.shape) in {AreaShape.SQUARE, AreaShape.DISK}
+    return float(light.size), float(light.size if square else light.size_y)
 
 
 def _shape(light, kind: LightKind) -> dict:
     if kind is LightKind.SUN:
         return {"angle": float(light.angle)}
     if kind is LightKind.AREA:
-        shape = AreaShape(light.shape)
-        square = shape in {AreaShape.SQUARE, AreaShape.DISK}
-        size = (float(light.size), float(light.size if square else light.size_y))
-        return {"area_shape": shape, "area_size": size, "area_spread": float(light.spread)}
+        spread = max(float(light.spread), MIN_SPREAD)
+        return {"area_shape": AreaShape(light.shape), "area_size": _area_size(light), "area_spread": spread}
     shape = {"radius": float(light.shadow_soft_size), "soft_falloff": bool(light.use_soft_falloff)}
     if kind is LightKind.SPOT:
         shape |= {"spot_angle": float(light.spot_size), "spot_blend": float(light.spot_blend)}
     return shape
+
+
+def _is_portal(light) -> bool:
+    """A Cycles light portal guides rays and gives no light. The property exists while Cycles is enabled."""
+    return light.type == "AREA" and bool(getattr(getattr(light, "cycles", None), "is_portal", False))
