@@ -1,0 +1,167 @@
+"""The scene on the GPU: uploads what ``Changes`` names, and keeps the list of draws."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .device.interface import Device, Texture, Vertices
+from .gpu_shaders.frame.structs import INSTANCE, MATERIAL
+from .gpu_shaders.frame.tables import replace_table
+from .scene.changes import Changes, world_bounds
+from .scene.data import Image, Instance, Material, Mesh, Scene, Visibility
+from .scene.data import Texture as ImageLookup
+
+UvMaps = tuple[str, str]  # the maps that the base colour's and the emission's texture use
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """One draw call: a run of triangles of one mesh with one material, for a run of instances."""
+
+    vertices: Vertices
+    first_vertex: int
+    vertex_count: int
+    first_instance: int
+    instance_count: int
+    material: int
+    visibility: Visibility
+    bounds: np.ndarray  # (2, 3) float64: of all its instances, world space
+
+
+class GpuScene:
+    """GPU copies of one Scene. ``uploads`` counts what was sent since it was made, for the reactivity tests."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.scene = Scene()
+        self.uploads: Counter[str] = Counter()
+        self.draws: tuple[Draw, ...] = ()
+        self.bounds = np.zeros((2, 3))
+        self.revision = 0  # grows with every update that changes something
+        self._moved: list[tuple[int, np.ndarray]] = []
+        self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
+        self._images: dict[Hashable, Texture] = {}
+        self.white = device.texture((1, 1), "RGBA16F", np.ones((1, 1, 4), np.float32))
+        self.instance_table: Texture | None = None
+        self.material_table: Texture | None = None
+
+    def update(self, scene: Scene, changes: Changes) -> None:
+        """Make the GPU hold ``scene``; only what ``changes`` names is uploaded."""
+        self.scene = scene
+        if changes.any:
+            self.revision += 1
+        for key in changes.images_removed:
+            self.device.free(self._images.pop(key))
+        for key in changes.images_added:
+            self._images[key] = self._upload_image(scene.images[key])
+        if changes.materials or self.material_table is None:
+            self._upload_materials(scene.materials)
+        if changes.geometry or changes.materials or self.instance_table is None:
+            self._place(scene, changes)
+        if len(changes.moved_bounds):
+            self._moved.append((self.revision, changes.moved_bounds))
+            del self._moved[:-64]
+
+    def moved_since(self, revision: int) -> np.ndarray | None:
+        """World boxes (n, 2, 3) where something changed after ``revision``; None: too long ago to tell."""
+        if self._moved and len(self._moved) == 64 and revision < self._moved[0][0]:
+            return None
+        boxes = [box for when, box in self._moved if when > revision]
+        return np.concatenate(boxes) if boxes else np.zeros((0, 2, 3))
+
+    def textures_of(self, material: int) -> dict[str, Texture]:
+        """The two samplers of a draw with this material."""
+        m = self.scene.materials[material]
+        return {"base_tx": self._image(m.base_color_texture), "emission_tx": self._image(m.emission_texture)}
+
+    @property
+    def triangle_count(self) -> int:
+        return sum(draw.vertex_count // 3 * draw.instance_count for draw in self.draws)
+
+    def free(self) -> None:
+        for resource in (*self._meshes.values(), *self._images.values(), self.white):
+            self.device.free(resource)
+        for table in (self.instance_table, self.material_table):
+            if table is not None:
+                self.device.free(table)
+        self._meshes.clear()
+        self._images.clear()
+        self.instance_table = self.material_table = None
+        self.draws = ()
+
+    def _image(self, lookup: ImageLookup | None) -> Texture:
+        return self.white if lookup is None else self._images.get(lookup.image, self.white)
+
+    def _upload_image(self, image: Image) -> Texture:
+        self.uploads["images"] += 1
+        height, width = image.pixels.shape[:2]
+        return self.device.texture((width, height), "RGBA16F", np.ascontiguousarray(image.pixels, np.float32))
+
+    def _upload_materials(self, materials: tuple[Material, ...]) -> None:
+        self.uploads["materials"] += 1
+        rows = [
+            {
+                "base_color": m.base_color,
+                "base_mode": _image_mode(m.base_color_texture),
+                "emission": m.emission,
+                "emission_mode": _image_mode(m.emission_texture),
+            }
+            for m in materials
+        ]
+        self.material_table = replace_table(self.device, MATERIAL.pack(rows), self.material_table)
+
+    def _place(self, scene: Scene, changes: Changes) -> None:
+        """Upload new meshes and the table of instances, and list the draws."""
+        self.uploads["instances"] += 1
+        groups: dict[tuple, list[Instance]] = defaultdict(list)
+        for instance in scene.instances:
+            groups[instance.mesh, instance.materials, instance.visibility].append(instance)
+        draws, matrices, wanted = [], [], set()
+        for (mesh_key, materials, visibility), members in groups.items():
+            mesh = scene.meshes[mesh_key]
+            boxes = np.array([world_bounds(member, scene) for member in members])
+            bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+            for slot, first, count in mesh.slots:
+                material = materials[min(slot, len(materials) - 1)]
+                maps = _uv_maps(scene.materials[material], mesh)
+                wanted.add((mesh_key, maps))
+                vertices = self._vertices(mesh, maps)
+                place = (3 * first, 3 * count, len(matrices), len(members), material, visibility, bounds)
+                draws.append(Draw(vertices, *place))
+            matrices += [member.world_from_object for member in members]
+        for key in self._meshes.keys() - wanted:
+            self.device.free(self._meshes.pop(key))
+        packed = INSTANCE.pack_arrays(len(matrices), world_from_object=np.array(matrices).reshape(-1, 4, 4))
+        self.instance_table = replace_table(self.device, packed, self.instance_table)
+        self.draws = tuple(draws)
+        every = [draw.bounds for draw in draws]
+        self.bounds = np.stack([np.min(every, 0)[0], np.max(every, 0)[1]]) if every else np.zeros((2, 3))
+
+    def _vertices(self, mesh: Mesh, maps: UvMaps) -> Vertices:
+        key = (mesh.key, maps)
+        if key not in self._meshes:
+            self.uploads["meshes"] += 1
+            none = np.zeros((len(mesh.positions), 2), np.float32)
+            self._meshes[key] = self.device.vertices(
+                {
+                    "in_position": mesh.positions,
+                    "in_normal": mesh.normals,
+                    "in_base_uv": mesh.uvs.get(maps[0], none),
+                    "in_emission_uv": mesh.uvs.get(maps[1], none),
+                }
+            )
+        return self._meshes[key]
+
+
+def _image_mode(lookup: ImageLookup | None) -> int:
+    return -1 if lookup is None else int(lookup.closest) + 2 * int(not lookup.repeat)
+
+
+def _uv_maps(material: Material, mesh: Mesh) -> UvMaps:
+    """The maps by name; "" where the material has no texture, so that its meshes are kept once."""
+    lookups = (material.base_color_texture, material.emission_texture)
+    return tuple("" if t is None else t.uv_map or mesh.active_uv for t in lookups)  # type: ignore[return-value]

@@ -1,0 +1,15 @@
+"""Everything that runs on the GPU: declarations in Python beside their GLSL, one folder a subject."""
+
+from __future__ import annotations
+
+from ..device.shader import Shader
+from . import frame
+from .rsm import Rsm
+from .technique import Technique
+
+TECHNIQUES: tuple[type[Technique], ...] = (Rsm,)
+
+
+def all_shaders() -> tuple[Shader, ...]:
+    """Every declared shader, for the checks that need no GPU."""
+    return (*frame.SHADERS, *(shader for technique in TECHNIQUES for shader in technique.shaders))

@@ -1,0 +1,110 @@
+"""Direct light: shadow maps and one full-screen pass over all lights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...device.interface import Device, Target, Texture
+from ...scene.data import Light, Visibility
+from .draws import ADD, draw_depth, visible_draws
+from .inputs import FrameInputs
+from .light_maps import LightMaps, MapTile
+from .lights import emitter_sample, has_size, light_row
+from .maps import light_faces
+from .shaders import DIRECT, SHADOW
+from .structs import LIGHT
+from .tables import replace_table
+
+if TYPE_CHECKING:
+    from ...gpu_scene import GpuScene
+
+# Lights in one full-screen pass: a GPU that is busy for seconds in one call is reset by its driver.
+LIGHTS_A_PASS = 16
+
+
+class DirectLight:
+    """Shadow maps and the light table of one renderer."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.maps = LightMaps(device, ["RG16F"])
+        self.light_table: Texture | None = None
+
+    def draw(
+        self, inputs: FrameInputs, target: Target, *, filtered: bool, resolution: int
+    ) -> Iterator[float]:
+        """Write this sample's direct irradiance / pi into ``target``; yields progress 0..1.
+
+        ``filtered``: shadows of sized lights are filtered (PCSS) from one map kept as long as nothing moves; otherwise
+        the map is drawn anew from a new point of the emitter every sample, which converges to the true penumbra.
+        """
+        lights = inputs.gpu_scene.scene.lights
+        self._prepare(inputs, lights, filtered, resolution)
+        for done in self._draw_shadows(inputs.gpu_scene):
+            yield 0.8 * done
+        for first in range(0, len(lights), LIGHTS_A_PASS):
+            self._shade(inputs, target, first, min(first + LIGHTS_A_PASS, len(lights)))
+            yield 0.8 + 0.2 * first / len(lights)
+
+    def free(self) -> None:
+        self.maps.free()
+        if self.light_table is not None:
+            self.device.free(self.light_table)
+            self.light_table = None
+
+    def _prepare(self, inputs: FrameInputs, lights: tuple[Light, ...], filtered: bool, resolution: int) -> None:
+        tiles: list[MapTile] = []
+        rows = []
+        for index, light in enumerate(lights):
+            sampled = has_size(light) and not filtered
+            source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index))
+            faces = ()
+            if light.casts_shadow:
+                faces = light_faces(light, inputs.gpu_scene.bounds, source if sampled else None)
+            rows.append(light_row(light, source, not sampled, len(tiles), len(faces)))
+            tiles += [MapTile(light.key, index, face) for face in faces]
+        self.maps.lay_out(tiles, resolution)
+        self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _draw_shadows(self, gpu_scene: GpuScene) -> Iterator[float]:
+        stale = self.maps.stale(gpu_scene)
+        for done, tile in enumerate(stale):
+            target, viewport = self.maps.begin(tile, gpu_scene)
+            draws = visible_draws(gpu_scene, Visibility.SHADOW, tile.face.sees)
+            draw_depth(
+                self.device,
+                gpu_scene,
+                SHADOW,
+                target,
+                draws,
+                viewport,
+                pc_clip_from_world=tile.face.clip_from_world,
+                pc_perspective=int(tile.face.perspective),
+                pc_far=tile.face.far,
+                pc_tile=float(viewport[2]),
+            )
+            yield (done + 1) / len(stale)
+
+    def _shade(self, inputs: FrameInputs, target: Target, first: int, last: int) -> None:
+        self.device.fullscreen(
+            DIRECT,
+            target,
+            state=ADD,
+            position_tx=inputs.gbuffer.position,
+            normal_tx=inputs.gbuffer.normal,
+            light_tx=self.light_table,
+            face_tx=self.maps.face_table,
+            shadow_depth_tx=self.maps.depth,
+            shadow_slope_tx=self.maps.colors[0],
+            pc_first_light=first,
+            pc_last_light=last,
+            pc_seed=inputs.noise_seed(0),
+        )
+
+
+def _offset(seed: int, light: int) -> np.ndarray:
+    """Where the light's sequence of emitter points begins: its own for every light, and always the same."""
+    return np.random.default_rng((seed & 0xFFFF, light)).random(3)

@@ -1,0 +1,4 @@
+void main()
+{
+  out_color = texture(image_tx, uv);
+}

@@ -1,0 +1,21 @@
+#include "frame/surface_lib.glsl"
+#include "lib/octahedron_lib.glsl"
+
+void main()
+{
+  /* gl_FragCoord.w is 1 / clip w: the view depth of a perspective view, 1 for an orthographic one. */
+  vec3 to_eye = pc_eye.w > 0.5 ? pc_eye.xyz - v_position : pc_eye.xyz;
+  vec3 geometric = surface_geometric_normal(v_position, normalize(to_eye));
+  vec3 normal = surface_shading_normal(v_normal, geometric);
+  out_position = vec4(v_position, 1.0);
+  out_normal = vec4(octahedron_encode(normal), octahedron_encode(geometric));
+  if (pc_holdout != 0) {
+    out_albedo = vec4(0.0, 0.0, 0.0, -1.0);
+    out_emission = vec4(0.0);
+    return;
+  }
+  Surface surface = surface_evaluate(
+      material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv);
+  out_albedo = vec4(surface.albedo, 1.0);
+  out_emission = vec4(surface.emission, 1.0);
+}

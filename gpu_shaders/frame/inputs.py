@@ -1,0 +1,48 @@
+"""What a frame hands to an indirect-light technique."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...device.interface import Texture
+from ...scene.data import View
+
+if TYPE_CHECKING:
+    from ...gpu_scene import GpuScene
+
+
+@dataclass(frozen=True, eq=False)
+class GBuffer:
+    """What the camera sees, one texel a pixel.
+
+    ``albedo`` RGBA16F: diffuse reflectance; a: 1 surface, 0 background, -1 holdout. ``emission`` RGBA32F radiance.
+    ``position`` RGBA32F world position, w 1 where there is a surface. ``normal`` RGBA32F: shading normal and
+    geometric normal, both octahedral and on the camera's side.
+    """
+
+    albedo: Texture
+    emission: Texture
+    position: Texture
+    normal: Texture
+    depth: Texture
+
+    @property
+    def colors(self) -> Sequence[Texture]:
+        return (self.albedo, self.emission, self.position, self.normal)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameInputs:
+    """One sample of one frame. ``seed`` is the frame's, the same for all of its samples."""
+
+    gpu_scene: GpuScene
+    gbuffer: GBuffer
+    view: View
+    sample: int
+    seed: int
+
+    def noise_seed(self, stream: int) -> int:
+        """A seed for sampling_hash() of this sample; ``stream`` tells its uses apart."""
+        return (self.seed * 7919 + self.sample * 65537 + stream * 4099) & 0x3FFFFFFF

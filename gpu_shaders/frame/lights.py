@@ -1,0 +1,126 @@
+"""Lights for the shaders: the table of lights, and the point of each emitter that a sample of the frame uses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...scene.data import AreaShape, Light, LightKind
+from .maps import light_axes
+
+KINDS = {LightKind.POINT: 0, LightKind.SPOT: 1, LightKind.SUN: 2, LightKind.AREA: 3}
+ROUND = (AreaShape.DISK, AreaShape.ELLIPSE)
+# 1/g, 1/g^2, 1/g^3 with g the root of g^4 = g + 1: the R3 sequence (Roberts 2018).
+_R3 = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
+
+
+def has_size(light: Light) -> bool:
+    """Whether the emitter is more than a point (a direction, for a sun)."""
+    if light.kind is LightKind.SUN:
+        return light.angle > 0
+    return light.kind is LightKind.AREA or light.radius > 0
+
+
+def half_size(light: Light) -> tuple[float, float]:
+    """Half the extent of an area light along its X and Y, metres, with the object's scale."""
+    lengths = np.linalg.norm(np.asarray(light.world_from_light)[:3, :2], axis=0)
+    x, y = light.area_size
+    if light.area_shape in (AreaShape.SQUARE, AreaShape.DISK):
+        y = x
+    return 0.5 * x * float(lengths[0]), 0.5 * y * float(lengths[1])
+
+
+def intensity(light: Light) -> np.ndarray:
+    """(3,) W/sr of a point or spot, W/sr along the axis of an area light, W/m² of a sun."""
+    scale = {LightKind.SUN: 1.0, LightKind.AREA: 1.0 / math.pi}.get(light.kind, 1.0 / (4.0 * math.pi))
+    return np.asarray(light.power, np.float64) * light.diffuse_factor * scale
+
+
+def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.ndarray:
+    """The point (sun: unit direction to the light) that sample ``index`` of the frame uses.
+
+    A point or spot light of radius R is a disc that turns to every receiver. One point must serve all receivers, so it is
+    drawn from the isotropic density whose projection onto any plane is the uniform disc: its inverse
+    Abel transform, proportional to 1 / sqrt(R² - r²).
+    """
+    u = (count_offset + _R3 * index) % 1.0
+    center = np.asarray(light.world_from_light, np.float64)[:3, 3]
+    axes = light_axes(light)
+    if light.kind is LightKind.SUN:
+        radius, angle = math.tan(0.5 * min(light.angle, 3.0)) * math.sqrt(u[0]), 2 * math.pi * u[1]
+        direction = axes @ np.array([radius * math.cos(angle), radius * math.sin(angle), 1.0])
+        return direction / np.linalg.norm(direction)
+    if light.kind is LightKind.AREA:
+        x, y = 2 * u[:2] - 1
+        if light.area_shape in ROUND:
+            x, y = math.sqrt(u[0]) * math.cos(2 * math.pi * u[1]), math.sqrt(u[0]) * math.sin(2 * math.pi * u[1])
+        half = half_size(light)
+        return center + axes[:, 0] * x * half[0] + axes[:, 1] * y * half[1]
+    if light.radius <= 0:
+        return center
+    z, angle = 2 * u[0] - 1, 2 * math.pi * u[1]
+    side = math.sqrt(max(1 - z * z, 0))
+    direction = np.array([side * math.cos(angle), side * math.sin(angle), z])
+    return center + light.radius * math.sin(_sine_squared_quantile(u[2])) * direction
+
+
+def _sine_squared_quantile(u: float) -> float:
+    """phi in [0, pi/2] whose density is sin²: solves (2 phi - sin 2 phi) / pi = u by bisection."""
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if (2 * middle - math.sin(2 * middle)) / math.pi < u:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int, face_count: int) -> dict:
+    """The LIGHT table row; ``source`` is the emitter point of this frame, ``filtered`` asks for PCSS instead."""
+    axes = light_axes(light)
+    center = np.asarray(light.world_from_light, np.float64)[:3, 3]
+    half = half_size(light) if light.kind is LightKind.AREA else (0.0, 0.0)
+    spot_cosine = math.cos(0.5 * light.spot_angle)
+    tangent, normalize = _spread(light)
+    if filtered:
+        source = axes[:, 2] if light.kind is LightKind.SUN else center
+    return {
+        "position": center,
+        "kind": KINDS[light.kind],
+        "axis_x": axes[:, 0],
+        "axis_y": axes[:, 1],
+        "axis_z": axes[:, 2],
+        "spot_cosine": spot_cosine,
+        "spot_smooth": 1.0 / max((1.0 - spot_cosine) * light.spot_blend, 1e-7),
+        "soft_radius_squared": light.radius**2 if light.soft_falloff and light.kind is not LightKind.AREA else 0.0,
+        "intensity": intensity(light),
+        "face_count": face_count,
+        "source": source,
+        "first_face": first_face,
+        "map_origin": center if filtered or light.kind is LightKind.SUN else source,
+        "filtered": int(filtered),
+        "half_size": half,
+        "spread_tangent": tangent,
+        "spread_normalize": normalize,
+        "blur_radius": _blur_radius(light, half),
+        "round_shape": int(light.area_shape in ROUND),
+    }
+
+
+def _blur_radius(light: Light, half: Sequence[float]) -> float:
+    if light.kind is LightKind.SUN:
+        return math.tan(0.5 * min(light.angle, 3.0))
+    if light.kind is LightKind.AREA:
+        return math.sqrt(half[0] * half[1])
+    return light.radius
+
+
+def _spread(light: Light) -> tuple[float, float]:
+    """Tangent of half the spread and Cycles' factor that keeps the light's power; (-1, 0): no limit."""
+    if light.kind is not LightKind.AREA or light.area_spread >= math.pi - 1e-4:
+        return -1.0, 0.0
+    half = 0.5 * max(light.area_spread, 1e-3)
+    return math.tan(half), 1.0 / (math.tan(half) - half)

@@ -1,0 +1,182 @@
+"""The faces a light looks at the scene through, and their tiles in an atlas. Plain numpy, no GPU.
+
+A spot has one perspective face, a sun one orthographic face fitted to the scene, a point light the six faces of a
+cube, an area light (and a spot too wide for one face) the half cube before it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...scene.data import Light, LightKind
+
+# A single perspective face beyond this full angle would spend most of its texels on the cone's edge.
+WIDEST_SINGLE_FACE = math.radians(130.0)
+# Room around a cone's edge: the receivers right on it, and those that a moved sample of the emitter sees.
+CONE_MARGIN = 1.02
+# Nearest distance that a perspective map holds, as a part of its farthest.
+NEAR_OF_FAR = 1e-4
+# float32 rounding of positions and matrices, in parts of the largest coordinate involved.
+ROUNDING = 3e-6
+
+_CUBE = {  # forward, up: in the light's frame, in the order of map_face_of() in map_lib.glsl
+    "-Z": ((0, 0, -1), (0, 1, 0)),
+    "+X": ((1, 0, 0), (0, 1, 0)),
+    "-X": ((-1, 0, 0), (0, 1, 0)),
+    "+Y": ((0, 1, 0), (0, 0, 1)),
+    "-Y": ((0, -1, 0), (0, 0, 1)),
+    "+Z": ((0, 0, 1), (0, 1, 0)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """One picture of the scene from a light. ``name`` tells a light's faces apart, "" where there is only one."""
+
+    name: str
+    face_from_world: np.ndarray  # (4, 4) float64: x right, y up, z forward
+    scale: tuple[float, float]
+    near: float
+    far: float
+    epsilon: float
+    perspective: bool
+
+    @property
+    def clip_from_world(self) -> np.ndarray:
+        """(4, 4) float64 OpenGL clip matrix."""
+        clip = np.zeros((4, 4))
+        clip[0, 0], clip[1, 1] = self.scale
+        if self.perspective:
+            near, far = self.near, self.far
+            clip[2, 2], clip[2, 3] = (far + near) / (far - near), -2 * far * near / (far - near)
+            clip[3, 2] = 1
+        else:
+            clip[2, 2], clip[2, 3], clip[3, 3] = 2 / self.far, -1, 1
+        return clip @ self.face_from_world
+
+    @property
+    def texel_measure(self) -> float:
+        """What one texel of a 1 x 1 tile covers: area at z = 1 (perspective), m² across the light (orthographic)."""
+        return 4.0 / (self.scale[0] * self.scale[1])
+
+    def sees(self, bounds: np.ndarray) -> np.ndarray:
+        """Which of the (n, 2, 3) world boxes may lie in this face's view: (n,) bool, never falsely False."""
+        if not len(bounds):
+            return np.zeros(0, bool)
+        pick = np.array([[(i >> k) & 1 for k in range(3)] for i in range(8)])
+        corners = np.stack([bounds[:, pick[:, k], k] for k in range(3)] + [np.ones((len(bounds), 8))], -1)
+        clip = corners @ self.clip_from_world.T
+        w = clip[..., 3:]
+        outside = np.concatenate([clip[..., :3] > w, clip[..., :3] < -w], -1).all(1)
+        return ~outside.any(-1)
+
+
+def light_axes(light: Light) -> np.ndarray:
+    """(3, 3) unit columns: the light's own X, Y, Z in the world."""
+    axes = np.asarray(light.world_from_light, np.float64)[:3, :3]
+    lengths = np.linalg.norm(axes, axis=0)
+    return axes / np.where(lengths > 0, lengths, 1.0)
+
+
+def light_faces(light: Light, bounds: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
+    """The faces of one light for a scene within ``bounds`` (2, 3).
+
+    ``source`` moves the light to a sample of its emitter: a point, for a sun the unit direction to it.
+    """
+    axes = light_axes(light)
+    if light.kind is LightKind.SUN:
+        return (_sun_face(axes, bounds, axes[:, 2] if source is None else source),)
+    origin = np.asarray(light.world_from_light[:3, 3] if source is None else source, np.float64)
+    farthest = np.linalg.norm(np.maximum(abs(bounds[0] - origin), abs(bounds[1] - origin)))
+    far = max(float(farthest) * 1.001, 1e-6)
+    reach = float(np.abs(bounds).max(initial=0.0)) + float(np.abs(origin).max())
+    epsilon = ROUNDING * max(1.0, reach / far)
+    if light.kind is LightKind.SPOT and light.spot_angle <= WIDEST_SINGLE_FACE:
+        tangent = math.tan(0.5 * light.spot_angle) * CONE_MARGIN
+        return (_cube_face("-Z", "", axes, origin, 1.0 / max(tangent, 1e-4), far, epsilon),)
+    names = list(_CUBE) if light.kind is LightKind.POINT else list(_CUBE)[:5]
+    return tuple(_cube_face(name, name, axes, origin, 1.0, far, epsilon) for name in names)
+
+
+def _cube_face(side, name, axes, origin, scale, far, epsilon) -> Face:
+    forward, up = (axes @ np.asarray(v, np.float64) for v in _CUBE[side])
+    return Face(name, _looking(origin, forward, up), (scale, scale), NEAR_OF_FAR * far, far, epsilon, True)
+
+
+def _looking(origin, forward, up) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.cross(forward, up), up, forward
+    matrix[:3, 3] = -matrix[:3, :3] @ origin
+    return matrix
+
+
+def _sun_face(axes, bounds, to_sun) -> Face:
+    """Orthographic, as small as the scene's bounds seen along the light allow; the view has no part in it."""
+    forward = -np.asarray(to_sun, np.float64)
+    up = axes[:, 1] - forward * (axes[:, 1] @ forward)
+    length = np.linalg.norm(up)
+    up = up / length if length > 1e-6 else _any_perpendicular(forward)
+    corners = np.array([[bounds[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
+    rows = np.stack([np.cross(forward, up), up, forward])
+    seen = corners @ rows.T
+    lower, upper = seen.min(0), seen.max(0)
+    half = np.maximum(0.5 * (upper - lower), 1e-6) * 1.001
+    center = 0.5 * (lower + upper)
+    depth = 2.0 * half[2]
+    matrix = np.eye(4)
+    matrix[:3, :3] = rows
+    matrix[:3, 3] = -center[0], -center[1], half[2] - center[2]
+    epsilon = ROUNDING * max(1.0, float(np.abs(bounds).max(initial=0.0)) / depth)
+    return Face("", matrix, (1.0 / half[0], 1.0 / half[1]), 0.0, depth, epsilon, False)
+
+
+def _any_perpendicular(v: np.ndarray) -> np.ndarray:
+    other = np.eye(3)[np.argmin(np.abs(v))]
+    other = other - v * (other @ v)
+    return other / np.linalg.norm(other)
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """Square tiles of one size in a square texture."""
+
+    tiles: int
+    tile: int  # texels along a tile's side
+    columns: int
+
+    @classmethod
+    def fitting(cls, tiles: int, wanted: int, texel_budget: int, largest: int) -> Atlas:
+        """As many tiles of the wanted size; halved until all fit the budget of texels and the largest texture."""
+        columns = max(1, math.ceil(math.sqrt(tiles)))
+        tile = wanted
+        while tile > 16 and ((columns * tile) ** 2 > max(texel_budget, wanted**2) or columns * tile > largest):
+            tile //= 2
+        return cls(tiles, tile, columns)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        rows = max(1, math.ceil(self.tiles / self.columns))
+        return self.columns * self.tile, rows * self.tile
+
+    def origin(self, index: int) -> tuple[int, int]:
+        return (index % self.columns) * self.tile, (index // self.columns) * self.tile
+
+    def viewport(self, index: int) -> tuple[int, int, int, int]:
+        return (*self.origin(index), self.tile, self.tile)
+
+
+def face_row(face: Face, atlas: Atlas, index: int) -> dict:
+    """The MAP_FACE table row of tile ``index``."""
+    return {
+        "face_from_world": face.face_from_world,
+        "scale": face.scale,
+        "origin": atlas.origin(index),
+        "far": face.far,
+        "near": face.near,
+        "epsilon": face.epsilon,
+        "tile": atlas.tile,
+        "perspective": int(face.perspective),
+    }

@@ -1,0 +1,48 @@
+"""Tables that the frame's shaders read: one declaration for numpy and for GLSL."""
+
+from ...device.structs import Struct
+
+INSTANCE = Struct("Instance", world_from_object="mat4")
+
+MATERIAL = Struct(
+    "Material",
+    base_color="vec3",
+    base_mode="int",  # -1: no texture; else the IMAGE_* bits of image_lib.glsl
+    emission="vec3",  # radiance, W/(m² sr)
+    emission_mode="int",
+)
+
+LIGHT = Struct(
+    "Light",
+    position="vec3",  # the emitter's centre
+    kind="int",  # LIGHT_* of light_lib.glsl
+    axis_x="vec3",  # the light's own axes in the world, unit; it looks down -axis_z
+    spot_cosine="float",  # cosine of half the cone
+    axis_y="vec3",
+    spot_smooth="float",  # 1 / (blend (1 - spot_cosine))
+    axis_z="vec3",
+    soft_radius_squared="float",  # a disc emitter that turns to the receiver: its radius squared, else 0
+    intensity="vec3",  # W/sr, sun: W/m²
+    face_count="int",  # shadow map faces, 0: casts no shadow
+    source="vec3",  # this frame's point on the emitter; sun: unit direction to it
+    first_face="int",
+    map_origin="vec3",  # where the shadow map was drawn from
+    filtered="int",  # 1: PCSS from the centre, 0: the map was drawn from `source`
+    half_size="vec2",  # area: half extents, metres
+    spread_tangent="float",  # area: tangent of half the spread, -1: none
+    spread_normalize="float",
+    blur_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
+    round_shape="int",  # area: 1 for disk and ellipse
+)
+
+MAP_FACE = Struct(
+    "MapFace",
+    face_from_world="mat4",  # rigid: x right, y up, z away from the light, metres
+    scale="vec2",  # tile coordinates = 1/2 + 1/2 scale * (xy / z, orthographic: xy)
+    origin="vec2",  # lower left texel of the tile in the atlas
+    far="float",  # metres
+    near="float",
+    epsilon="float",  # what float32 cannot tell apart, part of far
+    tile="float",  # texels along a side
+    perspective="int",
+)

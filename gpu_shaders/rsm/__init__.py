@@ -1,0 +1,242 @@
+"""Reflective shadow maps: one diffuse bounce gathered from what the lights see.
+
+C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
+
+1. Draw the scene from every light: position, normal and reflected flux (``maps``).
+2. Gather irradiance at every pixel from the texels, each a small Lambertian lamp: from all of them, from
+   the paper's disc around the pixel's own place in the map as published, or from that disc with exact weights.
+3. Screen-space interpolation (section 4.2 of the paper): gather on a coarse grid of pixels, reuse where plane and normal
+   agree, gather in full where they do not.
+
+Limits: no visibility between texel and pixel, so bounced light passes walls; diffuse reflectors only; one bounce;
+cost grows with every light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ...device.interface import Device, Target, Texture
+from ..frame.draws import ADD
+from ..frame.inputs import FrameInputs
+from ..technique import Item, Setting, Value
+from .maps import ReflectiveShadowMaps
+from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SHADERS
+
+# Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
+WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
+
+SETTINGS = (
+    Setting(
+        "estimator",
+        "ENUM",
+        "Estimator",
+        "How bounced light is summed from the texels of the maps",
+        "DISC_EXACT",
+        items=(
+            Item("DISC_EXACT", "Disc, Exact Weight", "Random texels, more of them near the pixel's own place in the map, "
+                 "each weighted exactly: noise that averages out over samples, and no error in level"),
+            Item("DISC_PUBLISHED", "Disc, as Published", "The disc of the 2005 paper with its weights: fast and smooth, but it "
+                 "loses near light and all light from beyond the disc"),
+            Item("ALL_TEXELS", "All Texels", "Every texel of every map: no noise at all, at the cost of many times the time"),
+        ),
+    ),
+    Setting(
+        "resolution",
+        "INT",
+        "Map Resolution",
+        "Texels along a side of each light's map. Higher keeps small and touching surfaces apart, at the cost of memory and of "
+        "time where all texels are gathered; lower is faster and blurs bounce close to corners",
+        256,
+        viewport_default=128,
+        minimum=16,
+        maximum=2048,
+        unit="texels",
+    ),
+    Setting(
+        "gathers",
+        "INT",
+        "Gathers",
+        "Texels that each pixel gathers from each light in one sample, for the disc estimators. More is less noise a sample, "
+        "at the cost of time",
+        64,
+        viewport_default=32,
+        minimum=1,
+        maximum=4096,
+        unit="texels",
+    ),
+    Setting(
+        "radius",
+        "FLOAT",
+        "Disc Radius",
+        "Radius of the disc of texels, in parts of the map's width. As published, light from beyond it is lost, so larger "
+        "is brighter and noisier; with exact weights it changes the noise only, and smaller is better where near surfaces "
+        "bounce most",
+        0.3,
+        minimum=0.01,
+        maximum=1.5,
+        unit="map widths",
+    ),
+    Setting(
+        "interpolation",
+        "ENUM",
+        "Interpolation",
+        "Gather at some pixels only and reuse the result where surfaces agree. Coarser is faster, at the cost of "
+        "detail in the bounce on small and curved surfaces",
+        "OFF",
+        viewport_default="4",
+        items=(
+            Item("OFF", "Off", "Every pixel gathers for itself"),
+            Item("2", "1:2", "Every second pixel of every second row gathers"),
+            Item("4", "1:4", "Every fourth pixel of every fourth row gathers"),
+            Item("8", "1:8", "Every eighth pixel of every eighth row gathers"),
+        ),
+    ),
+)
+
+
+class Rsm:
+    """See the module."""
+
+    id = "rsm"
+    label = "Reflective Shadow Maps"
+    description = "One diffuse bounce from what each light sees; off-screen light included, no occlusion of the bounce"
+    settings = SETTINGS
+    shaders = SHADERS
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.maps = ReflectiveShadowMaps(device)
+        self._none = device.texture((1, 1), "R32F")
+        self._coarse: tuple[Texture, Target] | None = None
+        self._reuse: tuple[Texture, Target] | None = None  # of the target that is interpolated into
+
+    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> Iterator[float]:
+        """Irradiance / pi of one bounce, added to ``target``; see ``Technique.indirect``."""
+        for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
+            yield 0.2 * done
+        if not inputs.gpu_scene.scene.lights:
+            return
+        if settings["interpolation"] == "OFF":
+            for done in self._gather(inputs, settings, target, self._none, 1, (0, 0)):
+                yield 0.2 + 0.8 * done
+            return
+        stride = int(settings["interpolation"])
+        offset = _grid_offset(inputs, stride)
+        coarse, coarse_target = self._coarse_target(inputs, stride)
+        self.device.clear(coarse_target)
+        for done in self._gather(inputs, settings, coarse_target, self._none, stride, offset):
+            yield 0.2 + 0.4 * done
+        reused = self._interpolate(inputs, coarse, target, stride, offset)
+        for done in self._gather(inputs, settings, target, reused, 1, (0, 0)):
+            yield 0.6 + 0.4 * done
+
+    def statistics(self) -> Mapping[str, float]:
+        atlas = self.maps.atlas
+        tile = atlas.tile if atlas else 0
+        return {
+            "rsm_maps": len(self.maps.tiles),
+            "rsm_maps_drawn": self.maps.drawn,
+            "rsm_resolution": tile,
+            "vpls": len(self.maps.tiles) * tile * tile,
+        }
+
+    def free(self) -> None:
+        self.maps.free()
+        for resource in (self._none, *(self._coarse or ()), *(self._reuse or ())):
+            self.device.free(resource)
+        self._coarse = self._reuse = None
+
+    def _gather(
+        self,
+        inputs: FrameInputs,
+        settings: Mapping[str, Value],
+        target: Target,
+        reused: Texture,
+        stride: int,
+        offset: tuple[int, int],
+    ) -> Iterator[float]:
+        """Add the chosen estimator's sum to ``target``, in passes of bounded work."""
+        positions, normals, fluxes = self.maps.colors
+        shared = {
+            "position_tx": inputs.gbuffer.position,
+            "normal_tx": inputs.gbuffer.normal,
+            "reused_tx": reused,
+            "rsm_position_tx": positions,
+            "rsm_normal_tx": normals,
+            "rsm_flux_tx": fluxes,
+            "pc_stride": stride,
+            "pc_offset": offset,
+        }
+        passes = self._all_passes if settings["estimator"] == "ALL_TEXELS" else self._disc_passes
+        work = WORK_SOFTWARE if self.device.is_software else WORK_HARDWARE
+        pixels = target.size[0] * target.size[1]
+        for shader, values, done in passes(inputs, settings, max(work // max(pixels, 1), 1)):
+            self.device.fullscreen(shader, target, state=ADD, **shared, **values)
+            yield done
+
+    def _all_passes(self, inputs, settings, texels):
+        """(shader, its constants, progress) for pieces of about ``texels`` texels."""
+        atlas = self.maps.atlas
+        width, height = atlas.size
+        rows = max(texels // width, 1)
+        for first in range(0, height, rows):
+            last = min(first + rows, height)
+            yield GATHER_ALL, {"pc_first_row": first, "pc_last_row": last, "pc_row_length": width}, last / height
+
+    def _disc_passes(self, inputs, settings, texels):
+        gathers = int(settings["gathers"])
+        published = settings["estimator"] == "DISC_PUBLISHED"
+        lights = len(inputs.gpu_scene.scene.lights)
+        step = max(texels // gathers, 1)
+        for first in range(0, lights, step):
+            last = min(first + step, lights)
+            values = {
+                "light_tx": self.maps.light_table,
+                "rsm_face_tx": self.maps.face_table,
+                "pc_first_light": first,
+                "pc_last_light": last,
+                "pc_samples": gathers,
+                "pc_radius": float(settings["radius"]),
+                "pc_tile": float(self.maps.atlas.tile),
+                "pc_seed": inputs.noise_seed(1),
+            }
+            yield GATHER_PUBLISHED if published else GATHER_EXACT, values, last / lights
+
+    def _interpolate(
+        self, inputs: FrameInputs, coarse: Texture, target: Target, stride: int, offset: tuple[int, int]
+    ) -> Texture:
+        """Fill what can be reused into ``target``; returns the texture that tells which pixels were."""
+        if self._reuse is None or self._reuse[1].colors[0] is not target.colors[0]:
+            for old in self._reuse or ():
+                self.device.free(old)
+            reused = self.device.texture(target.size, "R32F")
+            self._reuse = (reused, self.device.target([target.colors[0], reused]))
+        reused, both = self._reuse
+        self.device.fullscreen(
+            INTERPOLATE,
+            both,
+            position_tx=inputs.gbuffer.position,
+            normal_tx=inputs.gbuffer.normal,
+            coarse_tx=coarse,
+            pc_stride=stride,
+            pc_offset=offset,
+        )
+        return reused
+
+    def _coarse_target(self, inputs: FrameInputs, stride: int) -> tuple[Texture, Target]:
+        size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
+        if self._coarse is None or self._coarse[0].size[:2] != size:
+            for old in self._coarse or ():
+                self.device.free(old)
+            texture = self.device.texture(size, "RGBA32F")
+            self._coarse = (texture, self.device.target([texture]))
+        return self._coarse
+
+
+def _grid_offset(inputs: FrameInputs, stride: int) -> tuple[int, int]:
+    """Where the coarse grid begins: another place every sample, so that its pattern averages out."""
+    x, y = np.random.default_rng((inputs.seed & 0xFFFF, inputs.sample)).integers(0, stride, 2)
+    return int(x), int(y)

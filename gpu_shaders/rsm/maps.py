@@ -1,0 +1,100 @@
+"""Reflective shadow maps: one atlas with a tile for every face of every light."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...device.interface import Device, Texture
+from ...scene.data import Light, Visibility
+from ..frame.draws import draw_shaded, visible_draws
+from ..frame.light_maps import LightMaps, MapTile
+from ..frame.lights import light_row
+from ..frame.maps import light_faces
+from ..frame.structs import LIGHT
+from ..frame.tables import replace_table
+from .shaders import DRAW
+
+if TYPE_CHECKING:
+    from ...gpu_scene import GpuScene
+
+# What a light's picture does not depend on: where its tiles lie in the table of faces.
+_PLACE = {"first_face": 0}
+
+
+class ReflectiveShadowMaps(LightMaps):
+    """Colour textures: position and texel area (RGBA32F), normal (RGBA16F), reflected flux in watts (RGBA32F).
+
+    All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
+    """
+
+    def __init__(self, device: Device) -> None:
+        super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F"])
+        self.light_table: Texture | None = None
+        self._laid_out: tuple[int, int] | None = None
+
+    def update(self, gpu_scene: GpuScene, resolution: int) -> Iterator[float]:
+        """Draw the tiles that are out of date; yields progress 0..1 after each."""
+        if self._laid_out == (gpu_scene.revision, resolution):
+            return
+        self._lay_out_lights(gpu_scene, resolution)
+        stale = self.stale(gpu_scene)
+        for done, tile in enumerate(stale):
+            self._draw(gpu_scene, tile)
+            yield (done + 1) / len(stale)
+        self._laid_out = (gpu_scene.revision, resolution)
+
+    def read(self) -> Iterator[tuple[int, str, dict[str, np.ndarray]]]:
+        """Every tile read back: index of its light, name of its face, and the layers of ``renderer.RsmBuffers``."""
+        assert self.depth is not None
+        position, normal, flux = (self.device.read(texture)[..., :3] for texture in self.colors)
+        depth = self.device.read(self.depth)
+        for tile in self.tiles:
+            x, y, width, height = self.viewport(tile)
+            part = np.s_[y : y + height, x : x + width]
+            metres = np.where(depth[part] < 1.0, depth[part] * np.float32(tile.face.far), np.float32(0.0))
+            layers = {"depth": metres, "position": position[part], "normal": normal[part], "flux": flux[part]}
+            yield tile.light, tile.face.name, layers
+
+    def free(self) -> None:
+        super().free()
+        if self.light_table is not None:
+            self.device.free(self.light_table)
+            self.light_table = None
+        self._laid_out = None
+
+    def _lay_out_lights(self, gpu_scene: GpuScene, resolution: int) -> None:
+        tiles: list[MapTile] = []
+        rows = []
+        for index, light in enumerate(gpu_scene.scene.lights):
+            faces = light_faces(light, gpu_scene.bounds)
+            row = _center_row(light, len(tiles), len(faces))
+            look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
+            rows.append(row)
+            tiles += [MapTile(light.key, index, face, look) for face in faces]
+        self.lay_out(tiles, resolution)
+        self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _draw(self, gpu_scene: GpuScene, tile: MapTile) -> None:
+        target, viewport = self.begin(tile, gpu_scene)
+        draws = visible_draws(gpu_scene, Visibility.SHADOW | Visibility.BOUNCE, tile.face.sees)
+        draw_shaded(
+            self.device,
+            gpu_scene,
+            DRAW,
+            target,
+            draws,
+            viewport,
+            light_tx=self.light_table,
+            pc_clip_from_world=tile.face.clip_from_world,
+            pc_light=tile.light,
+            pc_perspective=int(tile.face.perspective),
+            pc_far=tile.face.far,
+            pc_texel_measure=tile.face.texel_measure / viewport[2] ** 2,
+        )
+
+
+def _center_row(light: Light, first_face: int, face_count: int) -> dict:
+    return light_row(light, np.zeros(3), True, first_face, face_count)

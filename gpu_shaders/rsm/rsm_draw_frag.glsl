@@ -1,0 +1,38 @@
+/* One texel of a reflective shadow map (Dachsbacher & Stamminger 2005, section 3): where the light falls, how the surface
+ * lies there, and the flux it sends back. The flux takes the light through the texel times the albedo; the receiver's cosine is not in
+ * it: it cancels against the surface's projected area. */
+#include "frame/light_lib.glsl"
+#include "frame/surface_lib.glsl"
+
+/* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond this. */
+const float RSM_GRAZING = 1e-2;
+
+void main()
+{
+  Light light = light_fetch(light_tx, pc_light);
+  vec3 to_light = light.kind == LIGHT_SUN ? light.axis_z : light.position - v_position;
+  float distance_squared = light.kind == LIGHT_SUN ? 1.0 : max(dot(to_light, to_light), 1e-20);
+  vec3 d = to_light * inversesqrt(max(dot(to_light, to_light), 1e-20));
+  vec3 geometric = surface_geometric_normal(v_position, d);
+  vec3 normal = surface_shading_normal(v_normal, geometric);
+
+  /* The solid angle of the texel (sun: its area across the light): pc_texel_measure is its area at z = 1, and
+   * cos^3 turns that into solid angle. z / distance is the cosine to the face's axis. */
+  float measure = pc_texel_measure;
+  if (light.kind != LIGHT_SUN) {
+    float cosine = 1.0 / (gl_FragCoord.w * sqrt(distance_squared));
+    measure *= cosine * cosine * cosine;
+  }
+  vec3 albedo = vec3(0.0);
+  if (pc_reflects != 0) {
+    albedo = surface_evaluate(
+        material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv).albedo;
+  }
+  vec3 flux = light_intensity(light, -d) * measure * albedo;
+  float area = measure * distance_squared / max(dot(geometric, d), RSM_GRAZING);
+
+  gl_FragDepth = clamp(pc_perspective != 0 ? 1.0 / (pc_far * gl_FragCoord.w) : gl_FragCoord.z, 0.0, 1.0);
+  out_position_area = vec4(v_position, area);
+  out_normal = vec4(normal, 1.0);
+  out_flux = vec4(flux, 1.0);
+}

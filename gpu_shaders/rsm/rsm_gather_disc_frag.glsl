@@ -1,0 +1,111 @@
+/* The disc of Dachsbacher & Stamminger 2005, section 4 and figure 4: texels around the receiver's own place in the map,
+ * (s + r_max xi1 sin 2 pi xi2, t + r_max xi1 cos 2 pi xi2), so their density falls as 1 / r from the centre.
+ *
+ * PUBLISHED  weight xi1^2, scaled by the texels in the disc over the sum of weights, so that map size and sample count
+ *            do not change the level. Light from beyond the disc is lost and near light is underweighted, as published.
+ * otherwise  the exact weight of that density, 2 pi r_max^2 xi1, with half of the samples spread over the
+ *            whole map and both halves weighted by the balance heuristic (Veach & Guibas 1995), so that the radius
+ *            changes the noise and not the level. */
+#include "frame/map_lib.glsl"
+#include "lib/octahedron_lib.glsl"
+#include "lib/sampling_lib.glsl"
+#include "rsm/rsm_lib.glsl"
+
+/* Share of the samples that the disc gets where the receiver has a place in the map. */
+const float GATHER_DISC_SHARE = 0.5;
+/* The mean of xi1^2. */
+const float GATHER_PUBLISHED_MEAN = 1.0 / 3.0;
+
+struct Gather {
+  vec3 P;
+  vec3 N;
+  int face;   /* the face that holds the receiver's place */
+  vec2 place; /* that place, tile coordinates */
+  bool placed;
+};
+
+vec3 gather_fetch(Gather g, int face_index, vec2 uv)
+{
+  if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
+    return vec3(0.0);
+  }
+  MapFace face = map_face_fetch(rsm_face_tx, face_index);
+  ivec2 texel = ivec2(face.origin + floor(uv * face.tile));
+  return rsm_texel_irradiance(texel, rsm_position_tx, rsm_normal_tx, rsm_flux_tx, g.P, g.N);
+}
+
+/* Tile coordinates of disc sample xi around the receiver's place. */
+vec2 gather_disc_uv(Gather g, vec2 xi)
+{
+  float angle = 2.0 * SAMPLING_PI * xi.y;
+  return g.place + pc_radius * xi.x * vec2(sin(angle), cos(angle));
+}
+
+#ifdef PUBLISHED
+vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
+{
+  vec3 sum = vec3(0.0);
+  if (!g.placed) {
+    return sum;
+  }
+  for (int i = 0; i < pc_samples; i++) {
+    vec2 xi = sampling_r2(i, shift);
+    sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
+  }
+  float texels = SAMPLING_PI * pc_radius * pc_radius * pc_tile * pc_tile;
+  return sum * texels / (GATHER_PUBLISHED_MEAN * float(pc_samples));
+}
+#else
+vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
+{
+  vec3 sum = vec3(0.0);
+  float share = g.placed ? GATHER_DISC_SHARE : 0.0;
+  int in_disc = int(share * float(pc_samples));
+  share = float(in_disc) / float(pc_samples);
+  for (int i = 0; i < pc_samples; i++) {
+    bool disc = i < in_disc;
+    vec2 xi = sampling_r2(disc ? i : i - in_disc, disc ? shift : fract(shift.yx + 0.5));
+    int face = g.face;
+    vec2 uv;
+    if (disc) {
+      uv = gather_disc_uv(g, xi);
+    }
+    else {
+      float pick = xi.x * float(face_count);
+      face = first_face + min(int(pick), face_count - 1);
+      uv = vec2(fract(pick), xi.y);
+    }
+    float r = distance(uv, g.place);
+    float in_disc_density = face == g.face && r < pc_radius ? 1.0 / (2.0 * SAMPLING_PI * max(r, 1e-6) * pc_radius) : 0.0;
+    float density = share * in_disc_density + (1.0 - share) / float(face_count);
+    sum += gather_fetch(g, face, uv) / density;
+  }
+  return sum * pc_tile * pc_tile / float(pc_samples);
+}
+#endif
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy) * pc_stride + pc_offset;
+  out_indirect = vec4(0.0);
+  vec4 position = texelFetch(position_tx, pixel, 0);
+  if (position.w == 0.0 || rsm_reused(reused_tx, ivec2(gl_FragCoord.xy))) {
+    return;
+  }
+  Gather g;
+  g.P = position.xyz;
+  g.N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
+  vec3 sum = vec3(0.0);
+  for (int i = pc_first_light; i < pc_last_light; i++) {
+    Light light = light_fetch(light_tx, i);
+    vec3 d = g.P - light.position;
+    vec3 local = vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z));
+    g.face = light.first_face + map_face_of(light.face_count, local);
+    MapFace face = map_face_fetch(rsm_face_tx, g.face);
+    vec3 p = map_position(face, g.P);
+    g.placed = map_holds(face, p);
+    g.place = g.placed ? map_uv(face, p) : vec2(0.5);
+    sum += gather_light(g, light.first_face, light.face_count, sampling_hash(pixel, pc_seed + i));
+  }
+  out_indirect = vec4(sum, 1.0);
+}

@@ -1,0 +1,79 @@
+"""Declarations of the passes of reflective shadow maps."""
+
+from ...device.shader import Shader
+from ..frame.shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
+from ..frame.structs import INSTANCE, LIGHT, MAP_FACE, MATERIAL
+
+DRAW = Shader(
+    name="rsm_draw",
+    vertex="frame/frame_draw_vert.glsl",
+    fragment="rsm/rsm_draw_frag.glsl",
+    inputs=MESH_INPUTS,
+    varyings=MESH_VARYINGS,
+    outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4"},
+    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D"},
+    structs=(INSTANCE, MATERIAL, LIGHT),
+    constants={
+        "pc_clip_from_world": "MAT4",
+        "pc_first_instance": "INT",
+        "pc_material": "INT",
+        "pc_reflects": "INT",
+        "pc_light": "INT",
+        "pc_perspective": "INT",
+        "pc_far": "FLOAT",
+        "pc_texel_measure": "FLOAT",  # see rsm_draw_frag.glsl
+    },
+    depth_write=True,
+)
+
+_GATHER = {
+    "position_tx": "FLOAT_2D",
+    "normal_tx": "FLOAT_2D",
+    "reused_tx": "FLOAT_2D",
+    "rsm_position_tx": "FLOAT_2D",
+    "rsm_normal_tx": "FLOAT_2D",
+    "rsm_flux_tx": "FLOAT_2D",
+}
+_GRID = {"pc_stride": "INT", "pc_offset": "IVEC2"}
+
+GATHER_ALL = Shader(
+    name="rsm_gather_all",
+    fragment="rsm/rsm_gather_all_frag.glsl",
+    outputs={"out_indirect": "VEC4"},
+    samplers=_GATHER,
+    constants={**_GRID, "pc_first_row": "INT", "pc_last_row": "INT", "pc_row_length": "INT"},
+)
+
+
+def _gather_disc(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+    return Shader(
+        name=name,
+        fragment="rsm/rsm_gather_disc_frag.glsl",
+        outputs={"out_indirect": "VEC4"},
+        samplers={**_GATHER, "light_tx": "FLOAT_2D", "rsm_face_tx": "FLOAT_2D"},
+        structs=(LIGHT, MAP_FACE),
+        constants={
+            **_GRID,
+            "pc_first_light": "INT",
+            "pc_last_light": "INT",
+            "pc_samples": "INT",
+            "pc_radius": "FLOAT",
+            "pc_tile": "FLOAT",
+            "pc_seed": "INT",
+        },
+        defines=defines,
+    )
+
+
+GATHER_PUBLISHED = _gather_disc("rsm_gather_disc_published", (("PUBLISHED", "1"),))
+GATHER_EXACT = _gather_disc("rsm_gather_disc_exact", ())
+
+INTERPOLATE = Shader(
+    name="rsm_interpolate",
+    fragment="rsm/rsm_interpolate_frag.glsl",
+    outputs={"out_indirect": "VEC4", "out_reused": "VEC4"},
+    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "coarse_tx": "FLOAT_2D"},
+    constants=_GRID,
+)
+
+SHADERS = (DRAW, GATHER_ALL, GATHER_PUBLISHED, GATHER_EXACT, INTERPOLATE)

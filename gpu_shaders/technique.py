@@ -1,0 +1,76 @@
+"""What an indirect-light technique is: settings that describe themselves, and a few calls that the renderer makes.
+
+A technique is one folder beside this file and one line in ``gpu_shaders.TECHNIQUES``. Techniques never import
+one another; what two of them share lives in ``lib/`` or ``frame/``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+if TYPE_CHECKING:
+    from ..device.interface import Device, Target
+    from ..device.shader import Shader
+    from .frame.inputs import FrameInputs
+
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True)
+class Item:
+    """One choice of an ENUM setting."""
+
+    key: str
+    label: str
+    description: str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One user-visible value. ``ui.properties`` makes a Blender property from it, the tests check its limits.
+
+    ``viewport_default`` given: the viewport has a value of its own, named ``viewport_<name>``.
+    ``unit`` is what the number counts ("px", "samples", "" for a pure number); ``description`` says the trade-off
+    both ways.
+    """
+
+    name: str
+    kind: Literal["FLOAT", "INT", "BOOL", "ENUM"]
+    label: str
+    description: str
+    default: Value
+    viewport_default: Value | None = None
+    minimum: float = 0
+    maximum: float = 1
+    unit: str = ""
+    items: tuple[Item, ...] = ()
+
+
+class Technique(Protocol):
+    """One way to compute indirect light. Instances hold GPU resources of one renderer and no other state."""
+
+    id: str  # "rsm"; its settings are named rsm_<setting> on scene.rebound
+    label: str
+    description: str
+    settings: tuple[Setting, ...]
+    shaders: tuple[Shader, ...]
+
+    def __init__(self, device: Device) -> None: ...
+
+    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> Iterator[float]:
+        """Write this sample's indirect irradiance / pi into ``target`` (RGBA32F, one colour, cleared before).
+
+        ``settings`` holds this technique's values by their short names. Yields its progress (0..1) after every
+        bounded piece of GPU work, so that a caller can show it and cancel between two pieces.
+        """
+        ...
+
+    def statistics(self) -> Mapping[str, float]:
+        """Counts of the newest sample, for the statistics panel and the tests."""
+        ...
+
+    def free(self) -> None:
+        """Release the GPU resources."""
+        ...

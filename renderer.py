@@ -1,0 +1,267 @@
+"""One frame: what the camera sees, direct light, one technique's indirect light, summed over anti-aliasing samples.
+
+The renderer knows no Blender. It works in pieces of bounded GPU time: ``sample`` is a generator, so that the caller
+can show progress, keep an interface alive, and cancel between two pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .device.interface import Device, Target, Texture
+from .gpu_scene import GpuScene
+from .gpu_shaders import TECHNIQUES
+from .gpu_shaders.frame.direct import DirectLight
+from .gpu_shaders.frame.draws import ADD, draw_shaded, visible_draws
+from .gpu_shaders.frame.inputs import FrameInputs, GBuffer
+from .gpu_shaders.frame.pixel_filter import pixel_offset
+from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
+from .gpu_shaders.rsm.maps import ReflectiveShadowMaps
+from .gpu_shaders.technique import Technique, Value
+from .passes import PASSES, RenderPass
+from .scene.data import View, Visibility
+from .settings import SETTINGS, Settings
+
+__all__ = ["PASSES", "SETTINGS", "Frame", "RenderError", "RenderPass", "Renderer", "RsmBuffers", "Settings"]
+
+SUMS = tuple(ACCUMULATE.outputs)  # the accumulated textures, in slot order
+
+
+class RenderError(RuntimeError):
+    """A picture that cannot be rendered as asked; the message is one line for the user."""
+
+
+@dataclass(eq=False)
+class Frame:
+    """The running sum of one picture: ``samples`` of it so far."""
+
+    width: int
+    height: int
+    gbuffer: GBuffer
+    gbuffer_target: Target
+    direct: Texture
+    direct_target: Target
+    indirect: Texture
+    indirect_target: Target
+    sums: Mapping[str, Texture]  # by the names of ACCUMULATE's outputs
+    sum_target: Target
+    geometry: tuple[Texture, Texture]  # position and depth, normal: of the first sample
+    geometry_target: Target
+    resolved: Texture
+    resolved_target: Target
+    samples: int = 0
+
+    @property
+    def resources(self) -> tuple[Texture | Target, ...]:
+        """Everything to free: framebuffers before their textures."""
+        targets = (
+            self.gbuffer_target,
+            self.direct_target,
+            self.indirect_target,
+            self.sum_target,
+            self.geometry_target,
+            self.resolved_target,
+        )
+        textures = (
+            *self.gbuffer.colors,
+            self.gbuffer.depth,
+            self.direct,
+            self.indirect,
+            *self.sums.values(),
+            *self.geometry,
+            self.resolved,
+        )
+        return (*targets, *textures)
+
+
+@dataclass(frozen=True, eq=False)
+class RsmBuffers:
+    """One face of one light's reflective shadow map, read back.
+
+    ``layers``: depth (h, w, 1), metres along the face's axis, 0 where the light sees nothing; position (h, w, 3), world;
+    normal (h, w, 3); flux (h, w, 3), watts. float32, row 0 at the bottom.
+    """
+
+    light: str
+    face: str
+    layers: Mapping[str, np.ndarray]
+
+
+class Renderer:
+    """Owns the passes and their GPU resources; one per session."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._direct = DirectLight(device)
+        self._techniques: dict[str, Technique] = {}
+        self._triangles = 0
+
+    def begin(self, view: View, settings: Settings) -> Frame:
+        """An empty frame of the view's size. Raises RenderError where the GPU has no texture of that size."""
+        size = (view.width, view.height)
+        largest = self.device.max_texture_size
+        if max(size) > largest or min(size) < 1:
+            raise RenderError(f"A picture of {size[0]} x {size[1]} pixels is not possible: this GPU takes 1 to {largest} a side")
+        return _new_frame(self.device, *size)
+
+    def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
+        """Add one anti-aliased sample to ``frame``; yields progress 0..1 after every bounded piece of GPU work.
+
+        Stop iterating to cancel: the frame then still is the mean of its whole samples.
+        """
+        inputs = FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, int(settings["seed"]))
+        self._triangles = gpu_scene.triangle_count
+        self._draw_gbuffer(frame, inputs)
+        yield 0.1
+        self.device.clear(frame.direct_target)
+        filtered = settings["soft_shadows"] == "FILTERED"
+        resolution = int(settings["shadow_resolution"])
+        for done in self._direct.draw(inputs, frame.direct_target, filtered=filtered, resolution=resolution):
+            yield 0.1 + 0.3 * done
+        self.device.clear(frame.indirect_target)
+        technique = self._technique(settings)
+        if technique is not None:
+            for done in technique.indirect(inputs, settings.of(technique.id), frame.indirect_target):
+                yield 0.4 + 0.55 * done
+        self._accumulate(frame, inputs)
+        yield 1.0
+
+    def texture(self, frame: Frame, key: str = "combined") -> Texture:
+        """RGBA32F mean of a summed pass so far, for the screen; valid until the next call."""
+        weight = 1.0 / max(frame.samples, 1)
+        self.device.fullscreen(
+            RESOLVE, frame.resolved_target, sum_tx=frame.sums[f"out_{key}"], pc_weight=weight
+        )
+        return frame.resolved
+
+    def read(self, frame: Frame, key: str) -> np.ndarray:
+        """One pass: (h, w, channels) float32, row 0 at the bottom."""
+        render_pass = next(p for p in PASSES if p.key == key)
+        return render_pass.read(lambda name: self._mean(frame, name))
+
+    def _mean(self, frame: Frame, name: str) -> np.ndarray:
+        if name == "position_depth":
+            return self.device.read(frame.geometry[0])
+        if name == "normal":
+            return self.device.read(frame.geometry[1])
+        return self.device.read(frame.sums[f"out_{name}"]) / np.float32(max(frame.samples, 1))
+
+    def rsm_buffers(self, gpu_scene: GpuScene, settings: Settings) -> list[RsmBuffers]:
+        """Every light's reflective shadow map, drawn for this scene."""
+        maps = ReflectiveShadowMaps(self.device)
+        try:
+            for _ in maps.update(gpu_scene, int(settings["rsm_resolution"])):
+                pass
+            names = [light.name for light in gpu_scene.scene.lights]
+            return [RsmBuffers(names[light], face, layers) for light, face, layers in maps.read()]
+        finally:
+            maps.free()
+
+    def statistics(self) -> Mapping[str, float]:
+        """Counts for the statistics panel and the tests."""
+        result: dict[str, float] = {
+            "triangles": self._triangles,
+            "shadow_maps": len(self._direct.maps.tiles),
+            "shadow_maps_drawn": self._direct.maps.drawn,
+            "shadow_resolution": self._direct.maps.atlas.tile if self._direct.maps.atlas else 0,
+        }
+        for technique in self._techniques.values():
+            result.update(technique.statistics())
+        return result
+
+    def free_frame(self, frame: Frame) -> None:
+        for resource in frame.resources:
+            self.device.free(resource)
+
+    def free(self) -> None:
+        self._direct.free()
+        for technique in self._techniques.values():
+            technique.free()
+        self._techniques.clear()
+
+    def _technique(self, settings: Settings) -> Technique | None:
+        """The chosen technique; the one before it gives its memory back."""
+        wanted = str(settings["method"]).lower()
+        for name in [name for name in self._techniques if name != wanted]:
+            self._techniques.pop(name).free()
+        for kind in TECHNIQUES:
+            if kind.id == wanted:
+                return self._techniques.setdefault(wanted, None) or self._make(kind)
+        return None
+
+    def _make(self, kind: type[Technique]) -> Technique:
+        technique = self._techniques[kind.id] = kind(self.device)
+        return technique
+
+    def _draw_gbuffer(self, frame: Frame, inputs: FrameInputs) -> None:
+        view = inputs.view
+        offset = pixel_offset(inputs.sample, inputs.gpu_scene.scene.filter_width)
+        jitter = np.eye(4)
+        jitter[:2, 3] = 2 * offset / (view.width, view.height)
+        clip_from_world = jitter @ view.clip_from_view @ view.view_from_world
+        world_from_view = np.linalg.inv(view.view_from_world)
+        eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
+        self.device.clear(frame.gbuffer_target)
+        draw_shaded(
+            self.device,
+            inputs.gpu_scene,
+            GBUFFER,
+            frame.gbuffer_target,
+            visible_draws(inputs.gpu_scene, Visibility.CAMERA | Visibility.HOLDOUT),
+            pc_clip_from_world=clip_from_world,
+            pc_eye=eye,
+        )
+
+    def _accumulate(self, frame: Frame, inputs: FrameInputs) -> None:
+        gbuffer, scene = frame.gbuffer, inputs.gpu_scene.scene
+        background = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
+        self.device.fullscreen(
+            ACCUMULATE,
+            frame.sum_target,
+            state=ADD,
+            albedo_tx=gbuffer.albedo,
+            emission_tx=gbuffer.emission,
+            direct_tx=frame.direct,
+            indirect_tx=frame.indirect,
+            pc_background=background,
+        )
+        if frame.samples == 0:
+            self.device.fullscreen(
+                GEOMETRY,
+                frame.geometry_target,
+                position_tx=gbuffer.position,
+                normal_tx=gbuffer.normal,
+                pc_view_from_world=inputs.view.view_from_world,
+            )
+        frame.samples += 1
+
+
+def _new_frame(device: Device, width: int, height: int) -> Frame:
+    def texture(name: str) -> Texture:
+        return device.texture((width, height), name)
+
+    gbuffer = GBuffer(
+        texture("RGBA16F"), texture("RGBA32F"), texture("RGBA32F"), texture("RGBA32F"), texture("DEPTH32F")
+    )
+    direct, indirect, resolved = texture("RGBA32F"), texture("RGBA32F"), texture("RGBA32F")
+    sums = {name: texture("RGBA32F") for name in SUMS}
+    geometry = (texture("RGBA32F"), texture("RGBA32F"))
+    return Frame(
+        width,
+        height,
+        gbuffer,
+        device.target(gbuffer.colors, gbuffer.depth),
+        direct,
+        device.target([direct]),
+        indirect,
+        device.target([indirect]),
+        sums,
+        device.target(list(sums.values())),
+        geometry,
+        device.target(geometry),
+        resolved,
+        device.target([resolved]),
+    )

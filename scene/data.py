@@ -1,0 +1,175 @@
+"""The scene as frozen numpy data: what every part of Rebound behind the depsgraph converter works on.
+
+Nothing here imports Blender. Units are Blender's: metres, watts, radians; colours and radiance are scene-linear
+in Blender's working space. Matrices are (4, 4) float64 row-major arrays that act on column vectors from the left:
+``world = world_from_object @ local``. A light and a camera look down their own -Z, as in Blender.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum, IntFlag
+
+import numpy as np
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of one evaluated geometry, expanded to corners and sorted by material slot.
+
+    ``key`` names this very state of the geometry: two meshes with one key hold the same arrays, and an edit
+    makes a new key. Corner arrays have 3 T rows for T triangles.
+    """
+
+    key: Hashable
+    positions: Array  # (3T, 3) float32, object space
+    normals: Array  # (3T, 3) float32, object space, unit; the shading normal of each corner
+    uvs: Mapping[str, Array]  # UV map name -> (3T, 2) float32
+    active_uv: str  # the map that an image texture uses by default; "" where there is none
+    slots: tuple[tuple[int, int, int], ...]  # (material slot, first triangle, triangle count), slots ascending
+    bounds: Array  # (2, 3) float32: lower and upper corner, object space
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.positions) // 3
+
+
+class Visibility(IntFlag):
+    """What an instance takes part in."""
+
+    CAMERA = 1  # seen by the camera
+    SHADOW = 2  # blocks light
+    BOUNCE = 4  # reflects light onto others (drawn into reflective shadow maps)
+    HOLDOUT = 8  # seen by the camera as a hole: alpha 0, no radiance
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One placed mesh."""
+
+    key: Hashable  # identity: stable while the object is moved or edited
+    mesh: Hashable  # Mesh.key
+    materials: tuple[int, ...]  # index into Scene.materials for each material slot; at least one entry
+    world_from_object: Array  # (4, 4) float64
+    visibility: Visibility
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Pixels of one image, scene-linear, straight alpha, row 0 at the bottom.
+
+    ``key`` changes when the pixels do. ``pixels`` is None where the file is missing: the material then shows its
+    constant instead, and Scene.warnings says so.
+    """
+
+    key: Hashable
+    name: str
+    pixels: Array  # (H, W, 4) float32
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image lookup by one UV map. ``uv_map`` "" means the mesh's active one."""
+
+    image: Hashable  # Image.key
+    uv_map: str = ""
+    repeat: bool = True  # False: the edge pixels are extended
+    closest: bool = False  # nearest texel instead of bilinear
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface as far as this version shades it: a Lambertian reflector that may emit.
+
+    The place for the full node graph: a material will carry generated GLSL beside these constants.
+    """
+
+    name: str
+    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # diffuse reflectance, 0..1
+    base_color_texture: Texture | None = None  # replaces base_color
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)  # radiance, W/(m² sr); strength included
+    emission_texture: Texture | None = None  # times emission
+
+
+class LightKind(Enum):
+    POINT = "POINT"
+    SPOT = "SPOT"
+    SUN = "SUN"
+    AREA = "AREA"
+
+
+class AreaShape(Enum):
+    SQUARE = "SQUARE"
+    RECTANGLE = "RECTANGLE"
+    DISK = "DISK"
+    ELLIPSE = "ELLIPSE"
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """One light in Cycles' units.
+
+    ``power`` is the RGB radiant power in watts (point, spot, area) or the RGB irradiance in W/m² of a surface that
+    faces the light (sun); colour, temperature and exposure are already in it. A point or spot light of power P has
+    the radiant intensity P / (4 pi) W/sr (the cone of a spot takes nothing away from it); an area light of area A
+    and power P emits the radiance P / (pi A).
+    """
+
+    key: Hashable
+    name: str
+    kind: LightKind
+    power: tuple[float, float, float]
+    world_from_light: Array  # (4, 4) float64, with the object's scale
+    radius: float = 0.0  # point, spot: metres
+    soft_falloff: bool = True  # point, spot: Blender's light.use_soft_falloff, the emitter is a disc facing the receiver; else a sphere
+    angle: float = 0.0  # sun: angular diameter, radians
+    spot_angle: float = 0.0  # spot: full cone angle, radians
+    spot_blend: float = 0.0  # spot: 0..1
+    area_shape: AreaShape = AreaShape.SQUARE
+    area_size: tuple[float, float] = (1.0, 1.0)  # area: full extent along the light's X and Y, metres
+    area_spread: float = np.pi  # area: radians
+    casts_shadow: bool = True
+    diffuse_factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class World:
+    """The background, one colour for now. ``color`` is radiance, strength included."""
+
+    color: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where the picture is taken from. Width and height are the pixels really drawn (a border's own size).
+
+    ``clip_from_view`` is an OpenGL projection (z in -1..1) of just those pixels, so a border, a shift or the viewport's
+    zoom is already in it; pixel (0, 0) is the lower left one.
+    """
+
+    view_from_world: Array  # (4, 4) float64, rigid
+    clip_from_view: Array  # (4, 4) float64
+    width: int
+    height: int
+
+    @property
+    def is_perspective(self) -> bool:
+        return bool(abs(self.clip_from_view[3, 3]) < 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that a frame needs except the view and the settings."""
+
+    meshes: Mapping[Hashable, Mesh] = field(default_factory=dict)
+    instances: tuple[Instance, ...] = ()
+    materials: tuple[Material, ...] = (Material("Default"),)
+    images: Mapping[Hashable, Image] = field(default_factory=dict)
+    lights: tuple[Light, ...] = ()
+    world: World = World()
+    film_transparent: bool = False
+    filter_width: float = 1.5  # Blender's pixel filter width, pixels
+    warnings: tuple[str, ...] = ()  # one line each: what could not be read, and what is shown in its place
