@@ -44,7 +44,7 @@ def main() -> int:
         files = write_stages(folder)
         if not files:
             raise SystemExit("lint: no shader is declared")
-        command = ["glslangValidator", "-l", *files]
+        command = ["glslangValidator", *files]
         answer = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         errors = complaints(answer.stdout, folder)
     print("\n".join(errors))
