@@ -8,7 +8,8 @@ import tempfile
 from collections.abc import Iterator
 
 import pytest
-import vulkan_backend
+
+from rebound.tests.blender import vulkan_backend
 
 # A user folder of their own keeps the developer's preferences and add-ons out of the tests. Set before bpy starts.
 _USER_FOLDER = tempfile.mkdtemp(prefix="rebound-test-user-")
