@@ -13,7 +13,7 @@ from .structs import Struct
 
 
 def texture_handle(kind: str) -> Callable[[Any], Any]:
-    """A function from Texture to its handle. A texture of another kind would crash Blender on Vulkan: it raises TypeError."""
+    """A function from Texture to its handle. Another kind, which would crash Blender on Vulkan, raises TypeError."""
 
     def handle(texture: Any) -> Any:
         if not isinstance(texture, Texture) or texture.kind != kind:
@@ -39,7 +39,7 @@ def image_handle(image: Image) -> Callable[[Any], Any]:
 
 
 def array_constant(type_name: str) -> Callable[[Any], np.ndarray]:
-    """A function from a vector or matrix to its contiguous array; a MAT4 is given row by row and leaves column by column."""
+    """A function from a vector or matrix to a contiguous array. A MAT4 comes row by row and leaves column by column."""
     components = CONSTANT_TYPES[type_name][0]
     if type_name == "MAT4":
         return _matrix

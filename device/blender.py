@@ -5,6 +5,7 @@ What the versions do differently stays in this file. It needs a GPU context: ins
 or a draw handler in the interface, or after gpu.init() (5.2) in background.
 """
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,16 +14,19 @@ import gpu
 import numpy as np
 
 from . import binding, blender_convert
-from .blender_log import run_captured, trace
+from .blender_log import PROBE, failed_stage, probed_line, run_captured, trace
 from .interface import Device, DeviceError, DrawState, Program, Target, Texture, Vertices, Viewport
-from .shader import Shader, ShaderError
+from .shader import Shader, ShaderError, Source
+
+_logger = logging.getLogger(__name__)
 
 _FORMATS = {"DEPTH32F": "DEPTH_COMPONENT32F"}
+_IS_4_5 = bpy.app.version < (5, 0, 0)
 _HAS_SAMPLER_STATE = bpy.app.version >= (5, 2, 0)
 _BLEND = {"NONE": "NONE", "ADDITIVE": "ADDITIVE_PREMULT", "ALPHA_PREMULT": "ALPHA_PREMULT"}
 
-# Programs live as long as Blender: a shader that is freed while bound makes the next draw on OpenGL use the old program,
-# and engine objects die on threads without a GPU context.
+# Programs live as long as Blender: a shader that is freed while bound makes the next draw on OpenGL use the old
+# program, and engine objects die on threads without a GPU context.
 _PROGRAMS: dict[Shader, Program] = {}
 
 
@@ -146,19 +150,32 @@ class BlenderDevice(Device):
 
     def _compile(self, shader: Shader) -> Program:
         sources = {stage: shader.assemble(stage) for stage in shader.stages}
-        texts = {stage: source.text for stage, source in sources.items()}
-        handle, error, log = run_captured(
-            lambda: gpu.shader.create_from_info(_create_info(shader, texts, self._backend))
-        )
+        handle, error, log = self._create(shader, {stage: source.text for stage, source in sources.items()})
         if error is not None:
-            stage, message = trace(log or str(error), sources)
-            raise ShaderError(shader.name, stage, message)
+            raise ShaderError(shader.name, *self._trace(shader, sources, log or str(error)))
+        if log:
+            _logger.debug("Shader %s: %s", shader.name, log.strip())
         program = Program(shader, handle)
         program.setters |= {n: _sampler_setter(handle, n, kind) for n, kind in shader.samplers.items()}
         program.setters |= {n: _image_setter(handle, n, image) for n, image in shader.images.items()}
         program.setters |= {n: _uniform_setter(handle, n, struct) for n, struct in shader.uniforms.items()}
         program.setters |= {n: _constant_setter(handle, n, type_name) for n, type_name in shader.constants.items()}
         return program
+
+    def _create(self, shader: Shader, texts: Mapping[str, str]) -> tuple[Any, Exception | None, str]:
+        if _IS_4_5 and self._backend == "OPENGL":
+            # Without it 4.5 takes its own line numbers for another source's, and prints none.
+            texts = {stage: "#line 1 0\n" + text for stage, text in texts.items()}
+        return run_captured(lambda: gpu.shader.create_from_info(_create_info(shader, texts, self._backend)))
+
+    def _trace(self, shader: Shader, sources: Mapping[str, Source], log: str) -> tuple[str, str]:
+        """(stage, message with file:line) of a failed compilation."""
+        probed = None
+        if _IS_4_5:
+            failed = failed_stage(log, shader.stages)
+            probe = {s: (PROBE if s == failed else "") + source.text for s, source in sources.items()}
+            probed = probed_line(self._create(shader, probe)[2])
+        return trace(log, sources, probed)
 
     # --- work --------------------------------------------------------------------------------------------------------
 
@@ -318,7 +335,7 @@ def _uniform_setter(handle: Any, name: str, struct: Any) -> Callable[[Any], None
 
 
 def _constant_setter(handle: Any, name: str, type_name: str) -> Callable[[Any], None]:
-    """Setter of a push constant. OpenGL's compiler drops unused ones, which Blender then refuses; the value is still checked."""
+    """Setter of a push constant. What OpenGL's compiler dropped is refused by Blender: only its value is checked."""
     try:
         location = handle.uniform_from_name(name)
     except ValueError:

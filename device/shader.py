@@ -46,87 +46,15 @@ IMAGE_FORMATS = ("RGBA32F", "RGBA16F", "RG32F", "RG16F", "R32F", "R16F", "RGBA8"
 
 # Words some Blender version or backend refuses as an identifier.
 RESERVED = frozenset(
-    [
-        "input",
-        "output",
-        "half",
-        "common",
-        "partition",
-        "active",
-        "filter",
-        "buffer",
-        "shared",
-        "sample",
-        "flat",
-        "template",
-        "this",
-        "class",
-        "union",
-        "enum",
-        "typedef",
-        "namespace",
-        "using",
-        "goto",
-        "input",
-        "inline",
-        "static",
-        "long",
-        "short",
-        "public",
-        "external",
-        "interface",
-        "fixed",
-        "unsigned",
-        "superp",
-        "char",
-        "resource",
-        "sampler2D",
-        "sampler3D",
-        "packed",
-        "constant",
-        "device",
-        "thread",
-        "threadgroup",
-        "sampler",
-        "texture2D",
-        "main",
-        "uv_",
-        "float",
-        "int",
-        "uint",
-        "bool",
-        "vec2",
-        "vec3",
-        "vec4",
-        "mat3",
-        "mat4",
-        "in",
-        "out",
-        "inout",
-        "void",
-        "const",
-        "return",
-        "if",
-        "else",
-        "for",
-        "while",
-        "do",
-        "break",
-        "continue",
-        "discard",
-        "switch",
-        "case",
-        "struct",
-        "uniform",
-        "attribute",
-        "varying",
-        "layout",
-        "texture",
-        "texelFetch",
-    ]
+    re.findall(
+        r"\w+",
+        "input output half common partition active filter buffer shared sample flat template this class union enum "
+        "typedef namespace using goto inline static long short public external interface fixed unsigned superp char "
+        "resource sampler2D sampler3D packed constant device thread threadgroup sampler texture2D main float int "
+        "uint bool vec2 vec3 vec4 mat3 mat4 in out inout void const return if else for while do break continue "
+        "discard switch case struct uniform attribute varying layout texture texelFetch ",
+    )
 )
-
-STAGES = ("vertex", "fragment", "compute")
 
 
 @dataclass(frozen=True)
@@ -167,8 +95,8 @@ class Shader:
     """
 
     name: str
-    #: Path below gpu_shaders/. Without it, a fragment shader is drawn by the built-in full-screen triangle, which gives it
-    #: ``vec2 uv`` in [0, 1].
+    #: Path below gpu_shaders/. Without it, a fragment shader is drawn by the built-in full-screen triangle, which
+    #: gives it ``vec2 uv`` in [0, 1].
     vertex: str = ""
     #: Without it, a vertex shader writes depth only.
     fragment: str = ""
@@ -187,8 +115,8 @@ class Shader:
     uniforms: Mapping[str, Struct] = _frozen()
     #: Structs whose GLSL (with its table fetch function) is put ahead of the source.
     structs: tuple[Struct, ...] = ()
-    #: Push constants, 128 bytes in all: {"pc_gain": "FLOAT"}. The prefix is needed: Vulkan up to Blender 5.0 makes macros
-    #: of the names.
+    #: Push constants, 128 bytes in all: {"pc_gain": "FLOAT"}. The prefix is needed: Vulkan up to Blender 5.0 makes
+    #: macros of the names.
     constants: Mapping[str, str] = _frozen()
     defines: tuple[tuple[str, str], ...] = ()
     #: The fragment shader writes gl_FragDepth.

@@ -73,7 +73,7 @@ def assemble(shader_name: str, stage: str, path: str, files: Mapping[str, str]) 
     """Read ``path`` and what it includes, each file once, comments removed.
 
     Paths are relative to gpu_shaders/; ``files`` (path to text) stand in front of the folder.
-    Raises ShaderError naming file and line for a missing file, a cyclic include, or a declaration that belongs in Python.
+    Raises ShaderError naming file and line for a missing file, a cyclic include, a declaration that belongs in Python.
     """
     source, done = Source(), set()
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a device makes and is told: textures, targets, vertices, the state of a draw."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .formats import FORMATS, Format
+
+Viewport = tuple[int, int, int, int]
+
+
+class DeviceError(RuntimeError):
+    """There is no usable GPU, or it refuses what every supported one can do. The message is one line for the user."""
+
+
+class Texture:
+    """A texture on the device: ``size`` (w, h) or (w, h, d), ``format``, ``layers`` (0: not an array)."""
+
+    def __init__(
+        self, size: tuple[int, ...], format: str, layers: int = 0, filter: str = "NEAREST", repeat: bool = False
+    ):
+        self.size, self.format, self.layers = size, format, layers
+        self.filter, self.repeat = filter, repeat
+        self.info: Format = FORMATS[format]
+        dimension = "3D" if len(size) == 3 else "2D_ARRAY" if layers else "2D"
+        #: What a sampler or an image must be declared as.
+        self.kind = f"{self.info.scalar}_{dimension}"
+        #: The backend's own object; None once freed.
+        self.handle: Any = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The numpy shape of its contents: (h, w, c), (d, h, w, c) or (layers, h, w, c)."""
+        outer = (self.layers,) if self.layers else ()
+        return (*outer, *reversed(self.size), self.info.channels)
+
+    def __repr__(self) -> str:
+        return f"Texture({self.size}, {self.format!r}{f', layers={self.layers}' if self.layers else ''})"
+
+
+class Target:
+    """Textures to draw into. It keeps them alive (a framebuffer does not)."""
+
+    def __init__(self, colors: tuple[Texture, ...], depth: Texture | None):
+        self.colors, self.depth = colors, depth
+        first = colors[0] if colors else depth
+        assert first is not None
+        self.size: tuple[int, int] = (first.size[0], first.size[1])
+        self.handle: Any = None
+
+
+class Vertices:
+    """Corner arrays of triangles, not indexed: three vertices a triangle."""
+
+    def __init__(self, count: int, layout: Mapping[str, tuple[str, int]]):
+        self.count = count
+        #: name: ("F" float32, "I" int32 or "U" uint32, components)
+        self.layout = dict(layout)
+        self.handle: Any = None
+        #: Whatever the backend makes of it for a shader, by shader.
+        self.cache: dict = {}
+
+
+@dataclass(frozen=True)
+class DrawState:
+    """Fixed-function state of a draw. ``depth_write`` needs a depth test; use "ALWAYS" to write without testing.
+
+    blend: "ADDITIVE" is dst + src in all four channels, "ALPHA_PREMULT" is src + dst * (1 - src.a).
+    cull: the faces left out; counter-clockwise is the front.
+    """
+
+    depth_test: str = "NONE"
+    depth_write: bool = False
+    blend: str = "NONE"
+    cull: str = "NONE"
+
+    def __post_init__(self):
+        for what, value, allowed in (
+            (
+                "depth_test",
+                self.depth_test,
+                ("NONE", "LESS", "LESS_EQUAL", "EQUAL", "GREATER", "GREATER_EQUAL", "ALWAYS"),
+            ),
+            ("blend", self.blend, ("NONE", "ADDITIVE", "ALPHA_PREMULT")),
+            ("cull", self.cull, ("NONE", "BACK", "FRONT")),
+        ):
+            if value not in allowed:
+                raise ValueError(f"DrawState: {what} {value!r} is none of {', '.join(allowed)}")
+        if self.depth_write and self.depth_test == "NONE":
+            raise ValueError('DrawState: depth_write without a depth test writes nothing; use depth_test="ALWAYS"')
+
+
+def corner_array(name: str, array: np.ndarray) -> np.ndarray:
+    array = np.asarray(array)
+    if array.dtype.kind not in "fiu" or array.ndim not in (1, 2):
+        raise ValueError(
+            f"vertex attribute {name}: (n, k) floats or integers expected, got {array.dtype} {array.shape}"
+        )
+    # Blender's attr_fill takes the bytes as they are: a wrong dtype or order would be garbage, silently.
+    kind = {"f": np.float32, "i": np.int32, "u": np.uint32}[array.dtype.kind]
+    array = np.ascontiguousarray(
+        array.reshape(len(array), -1) if array.size else array.reshape(0, 1 if array.ndim == 1 else array.shape[1]),
+        kind,
+    )
+    if array.shape[1] > 4:
+        raise ValueError(f"vertex attribute {name}: {array.shape[1]} components; at most 4")
+    return array
