@@ -45,7 +45,7 @@ class ProgressLine(logging.Handler):
 
 
 def follow_engine() -> None:
-    """Send the engine's log, and only that, through the progress line."""
+    """Show the engine's log through the progress line, in place of the lines it would write itself."""
     logger = logging.getLogger("rebound")
     logger.setLevel(logging.INFO)
     logger.propagate = False
@@ -92,8 +92,8 @@ def main() -> int:
     exr, png = OUT / "cornell_box.exr", OUT / "cornell_box.png"
     exr.unlink(missing_ok=True)
     png.unlink(missing_ok=True)
-    follow_engine()
     rebound.register()
+    follow_engine()
     print(f"render: {BLEND.relative_to(ROOT)}, Blender {bpy.app.version_string}", flush=True)
     try:
         seconds = render()
