@@ -85,13 +85,14 @@ def _pair_instances(old: Scene, new: Scene) -> Iterator[tuple[Instance | None, I
 
 
 def _same_instance(a: Instance | None, b: Instance | None) -> bool:
-    if a is b:
-        return True
     if a is None or b is None:
         return False
-    return (
+    return _same_place(a, b) and a.materials == b.materials
+
+
+def _same_place(a: Instance, b: Instance) -> bool:
+    return a is b or (
         a.mesh == b.mesh
-        and a.materials == b.materials
         and a.visibility == b.visibility
         and np.array_equal(a.world_from_object, b.world_from_object)
     )
@@ -116,7 +117,7 @@ def _same_light(a: Light, b: Light) -> bool:
 def _moved_bounds(old: Scene, new: Scene, pairs: tuple[tuple[Instance | None, Instance | None], ...]) -> Array:
     boxes = []
     for a, b in pairs:
-        if a is not None and b is not None and _same_instance(a, b) and _same_look(a, b, old, new):
+        if a is not None and b is not None and _same_place(a, b) and _same_look(a, b, old, new):
             continue
         if a is not None and a.mesh in old.meshes:
             boxes.append(world_bounds(a, old))

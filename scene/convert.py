@@ -12,9 +12,19 @@ from .errors import SceneError
 from .images import ImageReader
 from .lights import read_light
 from .materials import MaterialTable, read_world
-from .meshes import mesh_key, read_mesh
+from .meshes import content_key, mesh_key, read_mesh
 
 __all__ = ["SceneError", "convert_scene"]
+
+# Metres; Blender clamps infinity to the largest float, and beyond this a squared distance overflows single precision.
+FARTHEST = 1e18
+
+UNSHOWN_TYPES = {
+    "CURVES": "hair curves",
+    "POINTCLOUD": "point clouds",
+    "VOLUME": "volumes",
+    "GREASEPENCIL": "grease pencil strokes",
+}
 
 
 def convert_scene(
@@ -50,8 +60,7 @@ class _SceneReader:
         self.warnings: dict[str, None] = {}  # an ordered set: each line once
         self.images = ImageReader(previous.images, self.warn)
         self.materials = MaterialTable(self.images, self.warn, frame=depsgraph.scene_eval.frame_current)
-        self.meshes: dict[Hashable, Mesh] = {}
-        self.empty: set[Hashable] = set()
+        self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.keys: set[Hashable] = set()
@@ -62,15 +71,19 @@ class _SceneReader:
     def add(self, instance) -> None:
         """Take in one item of depsgraph.object_instances."""
         obj = instance.object
+        if not instance.show_self:
+            return
         # A curve, text, surface or metaball comes a second time, as an instance of its evaluated mesh.
-        if obj.type not in {"MESH", "LIGHT"} or not instance.show_self:
+        if obj.type not in {"MESH", "LIGHT"}:
+            if obj.type in UNSHOWN_TYPES:
+                self.warn(f"Object '{obj.name}': {UNSHOWN_TYPES[obj.type]} are not shown yet")
             return
         parent = instance.parent if instance.is_instance else obj
         if self.visible is not None and not self.visible(parent.original):
             return
         matrix = np.array(instance.matrix_world, np.float64)
-        if not np.isfinite(matrix).all():
-            self.warn(f"Object '{obj.name}': its transform is not finite; it is left out")
+        if not np.abs(matrix).max() < FARTHEST:  # false for NaN
+            self.warn(f"Object '{obj.name}': its transform is not finite or too large; it is left out")
             return
         key = self._unique_key(instance, obj, parent)
         if obj.type == "LIGHT":
@@ -85,36 +98,36 @@ class _SceneReader:
         if not visibility:
             return
         mesh = self._mesh(obj)
-        if mesh is None:
+        if mesh.triangle_count == 0:
             return
         slots = self._materials(obj, mesh)
         self.instances.append(Instance(key, mesh.key, slots, matrix, visibility))
 
-    def _mesh(self, obj) -> Mesh | None:
-        """The mesh of an object: one met before, one of the previous scene, or read now. None if nothing is to be drawn."""
+    def _mesh(self, obj) -> Mesh:
+        """The mesh of an object: one met before, one of the previous scene, or read now."""
         data = obj.data
-        key = mesh_key(data)
-        if key in self.meshes or key in self.empty:
-            return self.meshes.get(key)
-        mesh = self.previous.meshes.get(key)
-        if mesh is None:
-            mesh = self._read(obj, key)
-        if mesh is None:
-            self.empty.add(key)
-        else:
-            self.meshes[key] = mesh
-        return mesh
+        if not data.is_editmode:
+            return self._mesh_of_key(obj, data, mesh_key(data))
+        # The arrays of a mesh in edit mode are BMesh's; a temporary mesh holds them for us, and only its content names it.
+        mesh = obj.to_mesh()
+        try:
+            return self._mesh_of_key(obj, mesh, content_key(mesh))
+        finally:
+            obj.to_mesh_clear()
 
-    def _read(self, obj, key: Hashable) -> Mesh | None:
-        reading = read_mesh(obj.data, key)
-        if reading.bad_triangles:
-            self.warn(
-                f"Object '{obj.name}': {reading.bad_triangles} triangles have corners that are not finite; they are left out"
-            )
-        return reading.mesh
+    def _mesh_of_key(self, obj, data, key: Hashable) -> Mesh:
+        if key not in self.read:
+            mesh = self.previous.meshes.get(key) or read_mesh(data, key, obj.name)
+            for line in mesh.warnings:
+                self.warn(line)
+            self.read[key] = mesh
+        return self.read[key]
 
     def _materials(self, obj, mesh: Mesh) -> tuple[int, ...]:
         """Material indices by slot, at least as many as the mesh's slots reach."""
+        override = self.view_layer.material_override
+        if override is not None:
+            return (self.materials.index(override),) * (mesh.slots[-1][0] + 1)
         slots = [self.materials.index(slot.material) for slot in obj.material_slots] or [0]
         missing = mesh.slots[-1][0] + 1 - len(slots)
         return tuple(slots + [slots[-1]] * max(missing, 0))
@@ -151,9 +164,9 @@ class _SceneReader:
             line = camera_warning(scene.camera)
             if line and not self.for_viewport:
                 self.warn(line)
-        world = read_world(scene.world, self.warn)
+        world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.warn)
         return Scene(
-            meshes=self.meshes,
+            meshes={key: mesh for key, mesh in self.read.items() if mesh.triangle_count},
             instances=tuple(self.instances),
             materials=self.materials.finish(),
             images=self.images.images,

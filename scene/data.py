@@ -31,6 +31,7 @@ class Mesh:
     active_uv: str  # the map that an image texture uses by default; "" where there is none
     slots: tuple[tuple[int, int, int], ...]  # (material slot, first triangle, triangle count), slots ascending
     bounds: Array  # (2, 3) float32: lower and upper corner, object space
+    warnings: tuple[str, ...] = ()  # what could not be read, for Scene.warnings of every scene that uses it
 
     @property
     def triangle_count(self) -> int:
@@ -61,13 +62,14 @@ class Instance:
 class Image:
     """Pixels of one image, scene-linear, straight alpha, row 0 at the bottom.
 
-    ``key`` changes when the pixels do. ``pixels`` is None where the file is missing: the material then shows its
-    constant instead, and Scene.warnings says so.
+    ``key`` changes when the pixels do. A missing file has no Image: the material shows magenta instead, as in Blender,
+    and Scene.warnings says so.
     """
 
     key: Hashable
     name: str
     pixels: Array  # (H, W, 4) float32
+    warnings: tuple[str, ...] = ()  # what was approximated, for Scene.warnings of every scene that uses it
 
 
 @dataclass(frozen=True)

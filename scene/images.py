@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Hashable, Mapping
 
+import bpy
 import numpy as np
 from mathutils import Color
 
@@ -45,46 +47,56 @@ class ImageReader:
 
     def _read(self, image, frame: int) -> Hashable | None:
         key = image_key(image, frame)
-        if key not in self._previous:
+        found = self._previous.get(key)
+        if found is None:
             width, height = image.size  # loads the file
             if not (image.has_data and width and height and image.channels):
                 self._warn(f"Image '{image.name}': {_missing(image)}; magenta is shown instead")
                 return None
-            self.images[key] = Image(key, image.name, self._pixels(image, width, height))
-        else:
-            self.images[key] = self._previous[key]
-        if image.source == "TILED":
-            self._warn(f"Image '{image.name}': only the first UDIM tile is shown")
-        if image.source in {"SEQUENCE", "MOVIE"}:
-            self._warn(f"Image '{image.name}': of an animated image only the frame that Blender has loaded is shown")
+            found = read_image(image, key, width, height)
+        for line in found.warnings:
+            self._warn(line)
+        self.images[key] = found
         return key
 
-    def _pixels(self, image, width: int, height: int) -> Array:
-        raw = np.empty(width * height * image.channels, np.float32)
-        image.pixels.foreach_get(raw)
-        raw = raw.reshape(height, width, image.channels)
-        step = -(-max(width, height) // MAX_SIZE)
-        linear = self._to_linear(image)
-        if step == 1:
-            return linear(_rgba(raw))
-        self._warn(f"Image '{image.name}': {width}×{height} is averaged down {step} times to fit {MAX_SIZE} pixels")
-        return _averaged(raw, step, linear)
 
-    def _to_linear(self, image) -> Callable[[Array], Array]:
-        """The function from stored (H, W, 4) pixels to scene-linear ones, for this image's colour space."""
-        name = image.colorspace_settings.name
-        # Blender converts float files while it loads them; data and scene_linear are used as they are.
-        if image.is_float or image.colorspace_settings.is_data or name in {"scene_linear", ""}:
-            return lambda pixels: pixels
-        if name == "sRGB":
-            matrix = _matrix_of("from_rec709_linear_to_scene_linear")
-            return lambda pixels: _apply(matrix, _decode_srgb(pixels))
-        method = LINEAR_SPACES.get(name)
-        if method and hasattr(Color, method):
-            matrix = _matrix_of(method)
-            return lambda pixels: _apply(matrix, pixels)
-        self._warn(f"Image '{image.name}': colour space '{name}' is read as sRGB")
-        return _decode_srgb
+def read_image(image, key: Hashable, width: int, height: int) -> Image:
+    """Read the pixels of a bpy image that is loaded."""
+    warnings = []
+    if image.source == "TILED":
+        warnings.append(f"Image '{image.name}': only the first UDIM tile is shown")
+    if image.source in {"SEQUENCE", "MOVIE"}:
+        warnings.append(f"Image '{image.name}': of an animated image only the frame that Blender has loaded is shown")
+    raw = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(raw)
+    raw = raw.reshape(height, width, image.channels)
+    to_linear, straighten = _to_linear(image, warnings.append), _straightener(image)
+
+    def linear(pixels: Array) -> Array:
+        return straighten(to_linear(_rgba(pixels)))
+
+    step = -(-max(width, height) // MAX_SIZE)
+    if step == 1:
+        return Image(key, image.name, linear(raw), tuple(warnings))
+    warnings.append(f"Image '{image.name}': {width}×{height} is averaged down {step} times to fit {MAX_SIZE} pixels")
+    return Image(key, image.name, _averaged(raw, step, linear), tuple(warnings))
+
+
+def _to_linear(image, warn: Callable[[str], None]) -> Callable[[Array], Array]:
+    """The function from stored (H, W, 4) pixels to scene-linear ones, for this image's colour space."""
+    name = image.colorspace_settings.name
+    # Blender converts float files while it loads them; data and scene_linear are used as they are.
+    if image.is_float or image.colorspace_settings.is_data or name in {"scene_linear", ""}:
+        return lambda pixels: pixels
+    if name == "sRGB":
+        matrix = _matrix_of("from_rec709_linear_to_scene_linear")
+        return lambda pixels: _apply(matrix, _decode_srgb(pixels))
+    method = LINEAR_SPACES.get(name)
+    if method and hasattr(Color, method):
+        matrix = _matrix_of(method)
+        return lambda pixels: _apply(matrix, pixels)
+    warn(f"Image '{image.name}': colour space '{name}' is read as sRGB")
+    return _decode_srgb
 
 
 def image_key(image, frame: int) -> Hashable:
@@ -95,15 +107,24 @@ def image_key(image, frame: int) -> Hashable:
         image.source,
         image.colorspace_settings.name,
         image.alpha_mode,
+        _file_time(image),
     )
     if image.source == "GENERATED" and not image.is_dirty:
         size = (image.generated_width, image.generated_height)
-        return (*state, size, image.generated_type, tuple(image.generated_color))
+        return (*state, size, image.use_generated_float, image.generated_type, tuple(image.generated_color))
     if image.source in {"SEQUENCE", "MOVIE"}:
         return (*state, frame)
     if image.is_dirty and image.has_data:
         return (*state, _pixel_hash(image))
     return state
+
+
+def _file_time(image) -> int:
+    """When the file behind an image was written: a reload after an edit elsewhere is seen by it. 0 without a file."""
+    if image.packed_file or not image.filepath:
+        return 0
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    return os.stat(path).st_mtime_ns if os.path.isfile(path) else 0
 
 
 def _pixel_hash(image) -> bytes:
@@ -139,8 +160,32 @@ def _averaged(raw: Array, step: int, linear: Callable[[Array], Array]) -> Array:
     across, down = min(step, raw.shape[1]), min(step, raw.shape[0])
     out = np.empty((height, width, 4), np.float32)
     for row in range(height):
-        strip = linear(_rgba(raw[row * down : (row + 1) * down, : width * across]))
+        strip = linear(raw[row * down : (row + 1) * down, : width * across])
         out[row] = strip.reshape(down, width, across, 4).mean(axis=(0, 2))
+    return out
+
+
+def _straightener(image) -> Callable[[Array], Array]:
+    """The function to straight alpha: byte images have it; float files keep their colours multiplied by alpha."""
+    if image.alpha_mode == "NONE":
+        return _opaque
+    if image.is_float and image.alpha_mode == "PREMUL":
+        return _divided_by_alpha
+    return lambda pixels: pixels
+
+
+def _opaque(pixels: Array) -> Array:
+    out = pixels.copy()
+    out[..., 3] = 1.0
+    return out
+
+
+def _divided_by_alpha(pixels: Array) -> Array:
+    alpha = pixels[..., 3:]
+    if (alpha == 1.0).all():
+        return pixels
+    out = pixels.copy()
+    np.divide(pixels[..., :3], alpha, out=out[..., :3], where=alpha > 0.0)
     return out
 
 

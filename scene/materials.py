@@ -69,7 +69,7 @@ class MaterialTable:
     frame: int = 0
     materials: list[Material] = field(default_factory=lambda: [Material("Default")])
     _index: dict[int, int] = field(default_factory=dict)
-    _metallic: list[str] = field(default_factory=list)
+    _approximated: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def index(self, material) -> int:
         """The index of a bpy material (None: the default), which is read when it is first met."""
@@ -82,16 +82,17 @@ class MaterialTable:
             self._index[uid] = len(self.materials) - 1
         return self._index[uid]
 
-    def note_metallic(self, name: str) -> None:
-        if name not in self._metallic:
-            self._metallic.append(name)
+    def approximated(self, how: str, name: str) -> None:
+        """Count a material among those that share an approximation; ``finish`` names them in one line."""
+        self._approximated.setdefault(how, {})[name] = None
 
     def finish(self) -> tuple[Material, ...]:
         """The table; gives the warnings that are counted over the scene."""
-        if self._metallic:
-            names = ", ".join(f"'{name}'" for name in self._metallic[:3])
-            more = ", …" if len(self._metallic) > 3 else ""
-            self.warn(f"{len(self._metallic)} materials are metallic, which is shown as diffuse for now: {names}{more}")
+        for how, names in self._approximated.items():
+            shown = ", ".join(f"'{name}'" for name in list(names)[:3])
+            more = ", …" if len(names) > 3 else ""
+            noun = "material" if len(names) == 1 else "materials"
+            self.warn(f"{len(names)} {noun} ({shown}{more}): {how} for now")
         return tuple(self.materials)
 
 
@@ -149,10 +150,15 @@ class _Reader:
         return self.stand_in(found)
 
     def principled(self, found: Socket) -> Surface:
-        metallic = found.input("Metallic")
-        value = metallic and constant(metallic)
-        if value and mean(value) > 0.0:
-            self.table.note_metallic(self.name)
+        for name, plain, how in (
+            ("Metallic", 0.0, "metallic is shown as diffuse"),
+            ("Transmission Weight", 0.0, "transmission is shown as diffuse"),
+            ("Alpha", 1.0, "transparency is shown as opaque"),
+        ):
+            socket = found.input(name)
+            value = socket and constant(socket)
+            if value and abs(mean(value) - plain) > 1e-6:
+                self.table.approximated(how, self.name)
         emission = self.emission(found, "Emission Color", "Emission Strength")
         return Surface(self.paint(found.input("Base Color")), emission)
 
@@ -185,10 +191,11 @@ class _Reader:
         """A weighted sum. Only one image survives, that of the heavier shader; an image that ``multiplies`` keeps its weight."""
         if a.texture is None and b.texture is None:
             return Paint(tuple(wa * x + wb * y for x, y in zip(a.rgb, b.rgb, strict=True)))
-        (heavy, weight), (light, _) = ((a, wa), (b, wb)) if (a.texture is not None, wa) >= (b.texture is not None, wb) else ((b, wb), (a, wa))
-        if light.texture is not None or any(light.rgb) or weight != 1.0 and not multiplies:
-            self.problem("a mix of shaders shows only the image of one of them")
-        return Paint(tuple(c * weight for c in heavy.rgb) if multiplies else heavy.rgb, heavy.texture)
+        first_wins = (a.texture is not None, wa) >= (b.texture is not None, wb)
+        shown, weight, lost, lost_weight = (a, wa, b, wb) if first_wins else (b, wb, a, wa)
+        if lost_weight > 0.0 and (lost.texture or any(lost.rgb)) or (weight != 1.0 and not multiplies):
+            self.problem("of mixed shaders only one image is shown")
+        return Paint(tuple(c * weight for c in shown.rgb) if multiplies else shown.rgb, shown.texture)
 
     def stand_in(self, found: Socket) -> Surface:
         node = found.node

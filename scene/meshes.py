@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import hashlib
 from collections.abc import Hashable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,56 +18,57 @@ from .data import Array, Mesh
 FLATNESS = 1e-7
 
 
-@dataclass(frozen=True)
-class MeshReading:
-    """A mesh (None where no triangle is left) and how many triangles with non-finite corners were dropped."""
-
-    mesh: Mesh | None
-    bad_triangles: int
-
-
 def mesh_key(mesh) -> Hashable:
     """The key of an evaluated bpy mesh: changes whenever the arrays that `read_mesh` makes would.
 
     The session uid of evaluated data is new after every evaluation of the geometry and shared by all instances.
-    A mesh in edit mode keeps its uid while its vertices are dragged, so there its content is hashed.
     """
-    state = (mesh.session_uid, len(mesh.materials), _active_uv(mesh))
-    if mesh.session_uid == 0 or mesh.is_editmode:
-        return (*state, _content_hash(mesh))
-    return state
+    return (mesh.session_uid, len(mesh.materials), _active_uv(mesh))
 
 
-def read_mesh(mesh, key: Hashable) -> MeshReading:
-    """Read a bpy mesh into numpy. All arrays are copies: nothing refers to Blender's memory afterwards."""
+def content_key(mesh) -> Hashable:
+    """The key of a bpy mesh whose uid tells nothing: a temporary one, as made of an object in edit mode."""
+    return (_content_hash(mesh), len(mesh.materials), _active_uv(mesh))
+
+
+def read_mesh(mesh, key: Hashable, owner: str) -> Mesh:
+    """Read a bpy mesh into numpy. All arrays are copies: nothing refers to Blender's memory afterwards.
+
+    ``owner`` names the object in warnings. A mesh without one good triangle comes back with no triangles.
+    """
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     if count == 0:
-        return MeshReading(None, 0)
+        return _empty(key, ())
     corners = _triangle_corners(mesh, count)
-    positions = _positions(mesh)
-    triangle_points = positions.take(_corner_vertices(mesh).take(corners), axis=0)
-    good, bad_triangles, face_normals = _usable(triangle_points)
-    order = _order_by_slot(_triangle_slots(mesh, count), good)
+    triangle_points = _positions(mesh).take(_corner_vertices(mesh).take(corners), axis=0)
+    good, bad_count, face_normals = _usable(triangle_points)
+    warnings = ()
+    if bad_count:
+        warnings = (f"Object '{owner}': {bad_count} triangles have corners that are not finite; they are left out",)
+    triangle_slots = _triangle_slots(mesh, count)
+    order = _order_by_slot(triangle_slots, good)
     if len(order) == 0:
-        return MeshReading(None, bad_triangles)
-    slots = _slot_ranges(_triangle_slots(mesh, count)[order])
+        return _empty(key, warnings)
     if not _is_identity(order, count):
         corners, triangle_points, face_normals = corners[order], triangle_points[order], face_normals[order]
     flat = np.ascontiguousarray(corners).reshape(-1)
     points = np.ascontiguousarray(triangle_points).reshape(-1, 3)
-    return MeshReading(
-        Mesh(
-            key=key,
-            positions=points,
-            normals=_normals(mesh, flat, face_normals),
-            uvs=_uvs(mesh, flat),
-            active_uv=_active_uv(mesh),
-            slots=slots,
-            bounds=np.stack((points.min(axis=0), points.max(axis=0))),
-        ),
-        bad_triangles,
+    return Mesh(
+        key=key,
+        positions=points,
+        normals=_normals(mesh, flat, face_normals),
+        uvs=_uvs(mesh, flat),
+        active_uv=_active_uv(mesh),
+        slots=_slot_ranges(triangle_slots[order]),
+        bounds=np.stack((points.min(axis=0), points.max(axis=0))),
+        warnings=warnings,
     )
+
+
+def _empty(key: Hashable, warnings: tuple[str, ...]) -> Mesh:
+    nothing = np.zeros((0, 3), np.float32)
+    return Mesh(key, nothing, nothing, {}, "", (), np.zeros((2, 3), np.float32), warnings)
 
 
 def _triangle_corners(mesh, count: int) -> Array:

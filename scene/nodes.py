@@ -5,13 +5,14 @@ Knows nothing of what a shader means; ``materials`` and the world and light read
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import bpy
 
 RGB = tuple[float, float, float]
-MAX_DEPTH = 64  # nodes along one path; deeper than any real graph, and the end of a cyclic one
+MAX_STEPS = 1000  # reroutes and group borders along one link; more than any real graph, and the end of a cyclic one
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def active_output(tree):
 
 def source(socket: Socket) -> Socket:
     """Follow a link back to the output that really makes the value, or the unlinked input that holds its constant."""
-    for _ in range(MAX_DEPTH):
+    for _ in range(MAX_STEPS):
         back = _step(socket)
         if back is None:
             return socket
@@ -100,10 +101,11 @@ def default_rgb(socket) -> RGB:
     """A socket's own constant as RGB; black where it has none (shader sockets)."""
     value = getattr(socket, "default_value", 0.0)
     if isinstance(value, (int, float)):
-        return (float(value),) * 3
+        value = (value,) * 3
     if isinstance(value, str) or not hasattr(value, "__len__") or len(value) < 3:
         return (0.0, 0.0, 0.0)
-    return tuple(float(v) for v in value[:3])
+    red, green, blue = (float(v) if math.isfinite(v) else 0.0 for v in value[:3])
+    return red, green, blue
 
 
 def constant(socket: Socket) -> RGB | None:
@@ -115,8 +117,6 @@ def constant(socket: Socket) -> RGB | None:
         return None
     if found.node.bl_idname in {"ShaderNodeRGB", "ShaderNodeValue"}:
         return default_rgb(found.socket)
-    if found.node.bl_idname == "ShaderNodeBlackbody":
-        return None
     return None
 
 

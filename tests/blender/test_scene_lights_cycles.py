@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rebound.scene.convert import convert_scene
-from tests.support.light_reference import irradiance
+from rebound.tests.support.light_reference import irradiance
 
 pytestmark = pytest.mark.slow
 
