@@ -18,15 +18,24 @@ struct Receiver {
   float closeness;
 };
 
-/* Closeness of a blocker at tile coordinates `uv`, or -1e9 where the receiver is lit. */
-float shadow_blocker(
-    MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, vec2 uv)
+/* What a texel says of the receiver: it lies before it, it is (about) the receiver's own surface, or it lies
+ * behind, so that its centre misses the receiver's surface: beyond a silhouette. */
+const int SHADOW_BLOCKED = 1;
+const int SHADOW_LIT = 0;
+const int SHADOW_MISSED = -1;
+
+struct ShadowTap {
+  int state;
+  float closeness;
+};
+
+ShadowTap shadow_tap(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, vec2 uv)
 {
   vec2 place = clamp(floor(uv * face.tile), vec2(0.0), vec2(face.tile - 1.0));
   ivec2 texel = ivec2(face.origin + place);
   float depth = texelFetch(depth_tx, texel, 0).r;
   if (depth >= 1.0) {
-    return -1e9;
+    return ShadowTap(SHADOW_MISSED, 0.0);
   }
   vec2 center = (place + 0.5) / face.tile;
   float closeness = map_closeness(face, depth);
@@ -34,7 +43,8 @@ float shadow_blocker(
   vec2 slope = texelFetch(slope_tx, texel, 0).rg;
   bool before_receiver = closeness + dot(slope, receiver.uv - center) > receiver.closeness + tolerance;
   float plane = map_plane_closeness(face, receiver.p, receiver.n, center);
-  return before_receiver && closeness > plane + tolerance ? closeness : -1e9;
+  int state = before_receiver && closeness > plane + tolerance ? SHADOW_BLOCKED : SHADOW_LIT;
+  return ShadowTap(closeness < plane - 4.0 * tolerance ? SHADOW_MISSED : state, closeness);
 }
 
 Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
@@ -47,12 +57,18 @@ Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
   return receiver;
 }
 
-/* Visibility from one map position: one texel's width of softness, from noise over the samples. */
+/* Visibility from one map position: one texel's width of softness, from noise over the samples. A texel beyond the
+ * receiver's own silhouette tells nothing (a wall's top edge would be lit from beyond the ceiling that rests on it):
+ * the texel on the other side answers for it. */
 float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
-  vec2 uv = receiver.uv + (noise - 0.5) / face.tile;
-  return shadow_blocker(face, depth_tx, slope_tx, receiver, uv) > -1e8 ? 0.0 : 1.0;
+  vec2 aside = (noise - 0.5) / face.tile;
+  int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
+  if (state == SHADOW_MISSED) {
+    state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv - aside).state;
+  }
+  return state == SHADOW_BLOCKED ? 0.0 : 1.0;
 }
 
 /* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter.
@@ -69,9 +85,9 @@ float shadow_soft(
   float blockers = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {
     vec2 uv = receiver.uv + search * sampling_vogel_disc(i, SHADOW_TAPS, noise.x);
-    float closeness = shadow_blocker(face, depth_tx, slope_tx, receiver, uv);
-    if (closeness > -1e8) {
-      blocker += closeness;
+    ShadowTap tap = shadow_tap(face, depth_tx, slope_tx, receiver, uv);
+    if (tap.state == SHADOW_BLOCKED) {
+      blocker += tap.closeness;
       blockers += 1.0;
     }
   }
@@ -86,7 +102,7 @@ float shadow_soft(
   float lit = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {
     vec2 uv = receiver.uv + width * sampling_vogel_disc(i, SHADOW_TAPS, noise.y);
-    lit += shadow_blocker(face, depth_tx, slope_tx, receiver, uv) > -1e8 ? 0.0 : 1.0;
+    lit += shadow_tap(face, depth_tx, slope_tx, receiver, uv).state == SHADOW_BLOCKED ? 0.0 : 1.0;
   }
   return lit / float(SHADOW_TAPS);
 }

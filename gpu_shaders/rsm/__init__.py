@@ -27,6 +27,8 @@ from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SH
 
 # Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
 WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
+# However many lights there are, each gives at least this many: two from the disc, two from the whole map.
+LEAST_GATHERS_A_LIGHT = 4
 
 SETTINGS = (
     Setting(
@@ -59,8 +61,8 @@ SETTINGS = (
         "gathers",
         "INT",
         "Gathers",
-        "Texels that each pixel gathers from each light in one sample, for the disc estimators. More is less noise a sample, "
-        "at the cost of time",
+        "Texels that each pixel gathers in one sample, shared among the lights, for the disc estimators. More is less noise "
+        "a sample, at the cost of time",
         64,
         viewport_default=32,
         minimum=1,
@@ -187,9 +189,9 @@ class Rsm:
             yield GATHER_ALL, {"pc_first_row": first, "pc_last_row": last, "pc_row_length": width}, last / height
 
     def _disc_passes(self, inputs, settings, texels):
-        gathers = int(settings["gathers"])
         published = settings["estimator"] == "DISC_PUBLISHED"
         lights = len(inputs.gpu_scene.scene.lights)
+        gathers = max(int(settings["gathers"]) // lights, LEAST_GATHERS_A_LIGHT)
         step = max(texels // gathers, 1)
         for first in range(0, lights, step):
             last = min(first + step, lights)

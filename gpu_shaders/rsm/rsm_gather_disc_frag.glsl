@@ -11,7 +11,7 @@
 #include "lib/sampling_lib.glsl"
 #include "rsm/rsm_lib.glsl"
 
-/* Share of the samples that the disc gets where the receiver has a place in the map. */
+/* Share of the samples that the disc gets. */
 const float GATHER_DISC_SHARE = 0.5;
 /* The mean of xi1^2. */
 const float GATHER_PUBLISHED_MEAN = 1.0 / 3.0;
@@ -19,9 +19,8 @@ const float GATHER_PUBLISHED_MEAN = 1.0 / 3.0;
 struct Gather {
   vec3 P;
   vec3 N;
-  int face;   /* the face that holds the receiver's place */
-  vec2 place; /* that place, tile coordinates */
-  bool placed;
+  int face;   /* the face that looks the receiver's way */
+  vec2 place; /* the receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold */
 };
 
 vec3 gather_fetch(Gather g, int face_index, vec2 uv)
@@ -45,9 +44,6 @@ vec2 gather_disc_uv(Gather g, vec2 xi)
 vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
-  if (!g.placed) {
-    return sum;
-  }
   for (int i = 0; i < pc_samples; i++) {
     vec2 xi = sampling_r2(i, shift);
     sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
@@ -59,9 +55,8 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
-  float share = g.placed ? GATHER_DISC_SHARE : 0.0;
-  int in_disc = int(share * float(pc_samples));
-  share = float(in_disc) / float(pc_samples);
+  int in_disc = int(GATHER_DISC_SHARE * float(pc_samples));
+  float share = float(in_disc) / float(pc_samples);
   for (int i = 0; i < pc_samples; i++) {
     bool disc = i < in_disc;
     vec2 xi = sampling_r2(disc ? i : i - in_disc, disc ? shift : fract(shift.yx + 0.5));
@@ -103,8 +98,8 @@ void main()
     g.face = light.first_face + map_face_of(light.face_count, local);
     MapFace face = map_face_fetch(rsm_face_tx, g.face);
     vec3 p = map_position(face, g.P);
-    g.placed = map_holds(face, p);
-    g.place = g.placed ? map_uv(face, p) : vec2(0.5);
+    p.z = max(p.z, face.near);
+    g.place = clamp(map_uv(face, p), vec2(0.0), vec2(1.0));
     sum += gather_light(g, light.first_face, light.face_count, sampling_hash(pixel, pc_seed + i));
   }
   out_indirect = vec4(sum, 1.0);
