@@ -1,0 +1,95 @@
+"""The RenderEngine: each callback is a few lines that call a session. Only here and in operators are errors caught."""
+
+from __future__ import annotations
+
+import logging
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import bpy
+
+from .device.interface import DeviceError
+from .final_render import render as render_final
+from .main_thread import MainThreadError
+from .render_result import register_passes
+from .renderer import RenderError
+from .scene.errors import SceneError
+from .session import SESSIONS
+from .viewport import Viewport
+
+LOGGER = logging.getLogger("rebound")
+
+# What a user, a file or a machine can cause; the message is one line that says what to do. All else is our own fault.
+USER_FAULTS = (SceneError, RenderError, DeviceError, MainThreadError)
+
+
+class ReboundEngine(bpy.types.RenderEngine):
+    """Rebound for Blender. Its objects come and go as Blender likes; the state is in a Viewport or a final render."""
+
+    bl_idname = "REBOUND"
+    bl_label = "Rebound"
+    bl_use_preview = True
+    bl_use_eevee_viewport = True  # Material Preview mode is drawn by EEVEE, with its own studio lights
+    bl_use_shading_nodes_custom = False
+    # In background this is the only way to a GPU context. In a window it would freeze the interface (main_thread.py).
+    bl_use_gpu_context = bpy.app.background
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        register_passes(self, scene, renderlayer)
+
+    def render(self, depsgraph):
+        with _boundary(self._fail):
+            render_final(self, depsgraph)
+
+    def view_update(self, context, depsgraph):
+        viewport = self._viewport()
+        with _boundary(viewport.fail):
+            viewport.update(context, depsgraph)
+
+    def view_draw(self, context, depsgraph):
+        viewport = self._viewport()
+        with _boundary(viewport.fail):
+            viewport.draw(context, depsgraph)
+        viewport.draw_error(context)
+        self.update_stats("", viewport.progress)
+        if viewport.unfinished:
+            self.tag_redraw()
+
+    def _viewport(self) -> Viewport:
+        # Not made in __init__, which Blender calls twice for one object and for final renders too.
+        if not hasattr(self, "viewport"):
+            self.viewport = Viewport()
+            weakref.finalize(self, SESSIONS.orphans.append, self.viewport.session).atexit = False
+        return self.viewport
+
+    def _fail(self, message: str) -> None:
+        """An error that is reported (not raised, not error_set) makes Blender cancel: no picture is written."""
+        self.report({"ERROR"}, f"Rebound: {message}")
+
+
+@contextmanager
+def _boundary(fail: Callable[[str], None]) -> Iterator[None]:
+    """Nothing gets past a callback: every error becomes one line for ``fail``, our own faults a traceback as well."""
+    try:
+        yield
+    except USER_FAULTS as error:
+        LOGGER.debug("user fault", exc_info=True)
+        fail(_one_line(str(error)))
+    except Exception as error:  # our own fault: the boundary that architecture.md names
+        LOGGER.exception("internal error")
+        fail(_one_line(f"internal error, see the console: {type(error).__name__}: {error}"))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def register() -> None:
+    bpy.utils.register_class(ReboundEngine)
+
+
+def unregister() -> None:
+    SESSIONS.free_all()
+    if getattr(ReboundEngine, "is_registered"):  # noqa: B009  unknown to Blender's stubs
+        bpy.utils.unregister_class(ReboundEngine)

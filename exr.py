@@ -1,0 +1,52 @@
+"""Pictures as multi-layer OpenEXR files, through the OpenEXR wheel that travels with the extension."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+# Channel names by the number of channels of a layer.
+_SUFFIXES = {1: ("V",), 2: ("X", "Y"), 3: ("X", "Y", "Z"), 4: ("R", "G", "B", "A")}
+
+
+class ExrError(RuntimeError):
+    """A file that cannot be written; the message is one line for the user."""
+
+
+def layer_name(name: str) -> str:
+    """``name`` fit for one step of a channel name, whose steps are separated by dots."""
+    return name.replace(".", "_")
+
+
+def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
+    """Write (h, w, channels) float arrays, row 0 at the bottom, as 32-bit channels "<layer>.X" and so on.
+
+    Layers of one size share a part of the file, so that most files have one part, as every program expects. Raises
+    ExrError where the OpenEXR wheel is missing or the file cannot be written.
+    """
+    try:
+        import OpenEXR  # noqa: PLC0415  everything else works without the wheel
+    except ImportError as error:
+        raise ExrError(
+            "The Python package OpenEXR is missing: install Rebound from its zip file, which carries it"
+        ) from error
+    by_size: dict[tuple[int, int], dict[str, np.ndarray]] = {}
+    for name, array in layers.items():
+        by_size.setdefault(array.shape[:2], {}).update(_channels(name, array))
+    parts = [
+        OpenEXR.Part({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels, f"{w} x {h}")
+        for (h, w), channels in by_size.items()
+    ]
+    try:
+        OpenEXR.File(parts).write(str(path))
+    except (OSError, RuntimeError) as error:
+        raise ExrError(f"Cannot write '{path}': {error}") from error
+
+
+def _channels(layer: str, array: np.ndarray) -> dict[str, np.ndarray]:
+    """EXR counts its rows from the top."""
+    flipped = array[::-1].astype(np.float32)
+    suffixes = _SUFFIXES[array.shape[2]]
+    return {f"{layer}.{suffix}": np.ascontiguousarray(flipped[..., i]) for i, suffix in enumerate(suffixes)}

@@ -1,0 +1,113 @@
+"""GPU work of a final render, run on the thread that has Blender's GPU context.
+
+In background, and wherever a render runs on the main thread, that is the calling thread itself. F12 in a window renders
+in a thread of its own. Blender would lend it the GPU context (``bl_use_gpu_context``), but then freezes its whole
+interface until the render ends, so that Esc never arrives. Instead the render thread posts each bounded piece of GPU
+work here, a timer on the main thread runs it, and between two pieces Blender draws its interface.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from typing import TypeVar
+
+import bpy
+
+T = TypeVar("T")
+
+IDLE_INTERVAL = 0.1  # seconds between two looks at an empty queue: how long the first piece of a render may wait
+BUSY_INTERVAL = 0.002  # seconds between two ticks of a running render: time for Blender's own events
+BUDGET = 0.03  # seconds of work in one tick, so that the interface keeps 20 to 30 frames a second
+BUSY_AFTER_JOB = 0.5  # seconds after a piece for which the timer stays fast
+NO_ANSWER = 120.0  # seconds after which a main thread that took no job is given up
+
+
+class Cancelled(Exception):  # noqa: N818  an event, no error
+    """The render was cancelled before this piece of work was begun."""
+
+
+class MainThreadError(Exception):
+    """The main thread took no work for so long that the render gives up."""
+
+
+class MainThread:
+    """The queue between render threads and the timer."""
+
+    def __init__(self) -> None:
+        self._jobs: queue.SimpleQueue[tuple[Future, Callable[[], object]]] = queue.SimpleQueue()
+        self._newest_job = 0.0
+
+    def run(self, call: Callable[[], T], cancelled: Callable[[], bool], *, patience: float = NO_ANSWER) -> T:
+        """Run ``call`` on the main thread and return what it returns, or raise what it raises.
+
+        Work that was not begun yet is withdrawn when ``cancelled()`` says so (raises Cancelled) and when the main
+        thread does not get to it within ``patience`` seconds (raises MainThreadError): Blender may be quitting,
+        and then waits for us.
+        """
+        if threading.current_thread() is threading.main_thread():
+            return call()
+        future = self._put(call)
+        deadline = time.monotonic() + patience
+        while not wait((future,), timeout=0.05).done:
+            if cancelled() and future.cancel():
+                raise Cancelled
+            if time.monotonic() > deadline and future.cancel():
+                raise MainThreadError(f"Blender's main thread did not answer for {patience:.0f} s")
+        return future.result()
+
+    def post(self, call: Callable[[], object]) -> None:
+        """Run ``call`` on the main thread some time later (now, where this is the main thread)."""
+        if threading.current_thread() is threading.main_thread():
+            call()
+        else:
+            self._put(call)
+
+    def _put(self, call: Callable[[], object]) -> Future:
+        future: Future = Future()
+        self._jobs.put((future, call))
+        return future
+
+    def tick(self) -> float:
+        """What the timer calls: do waiting work for a bounded time and say when to come again."""
+        end = time.monotonic() + BUDGET
+        while time.monotonic() < end:
+            try:
+                future, call = self._jobs.get_nowait()
+            except queue.Empty:
+                break
+            _complete(future, call)
+            self._newest_job = time.monotonic()
+        return BUSY_INTERVAL if time.monotonic() - self._newest_job < BUSY_AFTER_JOB else IDLE_INTERVAL
+
+
+def _complete(future: Future, call: Callable[[], object]) -> None:
+    """Run ``call`` for ``future`` unless it was withdrawn."""
+    if not future.set_running_or_notify_cancel():
+        return
+    try:
+        future.set_result(call())
+    except Exception as error:  # noqa: BLE001  not swallowed: handed to the thread that waits for it, which raises it
+        future.set_exception(error)
+
+
+# One per process, as Blender has one main thread. The timer is registered when the extension is enabled, because
+# registering one from a render thread is a race inside Blender.
+MAIN_THREAD = MainThread()
+
+
+def _tick() -> float:
+    return MAIN_THREAD.tick()  # a function and no bound method: Blender knows a timer by the identity of its function
+
+
+def register() -> None:
+    if not bpy.app.background:
+        bpy.app.timers.register(_tick, first_interval=IDLE_INTERVAL, persistent=True)
+
+
+def unregister() -> None:
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)

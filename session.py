@@ -1,0 +1,236 @@
+"""One viewport or one final render: its scene, its GPU copies, its renderer. The only state that outlives a callback.
+
+Data flows one way: ``Session.sync`` reads Blender (CPU only, on any thread); ``Session.picture`` and what it returns
+work on the GPU (on the thread that has the context).
+"""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .device.blender import BlenderDevice
+from .gpu_scene import GpuScene
+from .gpu_shaders.frame import DISPLAY
+from .renderer import Frame, Renderer, RsmBuffers
+from .scene.changes import Changes
+from .scene.convert import convert_scene
+from .scene.data import Scene, View
+from .settings import Settings, named_settings
+
+
+@dataclass
+class Status:
+    """What the status panel shows of a session."""
+
+    device: str = ""
+    error: str = ""
+    warnings: tuple[str, ...] = ()
+    statistics: Mapping[str, float] = field(default_factory=dict)
+    samples: int = 0
+
+
+@dataclass(eq=False)
+class Picture:
+    """A picture that is being accumulated on the GPU, and what it was begun for."""
+
+    device: BlenderDevice
+    gpu_scene: GpuScene
+    renderer: Renderer
+    frame: Frame
+    view: View
+    settings: Settings
+    status: Status
+    _pieces: Iterator[float] | None = None  # of the sample under way
+    _part: float = 0.0  # how far that is, 0..1
+
+    @property
+    def samples(self) -> int:
+        """Whole samples so far."""
+        return self.frame.samples
+
+    @property
+    def done(self) -> float:
+        """Samples so far, with the part of the one under way."""
+        return self.samples + self._part
+
+    def piece(self) -> bool:
+        """Do one bounded piece of GPU work; True when that completed a sample."""
+        if self._pieces is None:
+            self._pieces = self.renderer.sample(self.frame, self.gpu_scene, self.view, self.settings)
+        self._part = next(self._pieces, 1.0)
+        if self._part < 1.0:
+            return False
+        for _ in self._pieces:  # nothing is left but the generator's own end
+            pass
+        self._pieces, self._part = None, 0.0
+        self.status.samples = self.samples
+        self.status.statistics = dict(self.renderer.statistics())
+        return True
+
+    def advance(self, seconds: float) -> None:
+        """Work for about so long, but at least until there is a first sample and at most until there is one more."""
+        end = time.perf_counter() + seconds
+        while self.samples == 0 or time.perf_counter() < end:
+            if self.piece():
+                return
+
+    def show(self) -> None:
+        """Draw the picture so far into the framebuffer that is bound now."""
+        self.device.draw_to_current(DISPLAY, image_tx=self.renderer.texture(self.frame))
+
+    def read(self, key: str) -> np.ndarray:
+        """One pass of the picture so far: (h, w, channels) float32, row 0 at the bottom."""
+        return self.renderer.read(self.frame, key)
+
+    def is_for(self, view: View, settings: Settings) -> bool:
+        """True if the picture was begun for this view with these settings."""
+        return self.settings == settings and same_view(self.view, view)
+
+    def free(self) -> None:
+        """Give its GPU memory back."""
+        self._pieces = None
+        self.renderer.free_frame(self.frame)
+
+
+class _Gpu:
+    """The GPU side of a session. Raises DeviceError without a usable GPU."""
+
+    def __init__(self) -> None:
+        self.device = BlenderDevice()
+        self.scene = GpuScene(self.device)
+        self.renderer = Renderer(self.device)
+        self.holds: Scene | None = None  # what the GPU scene was updated to
+
+    def upload(self, scene: Scene) -> bool:
+        """Make the GPU hold ``scene``; True if that changes the picture."""
+        if self.holds is scene:
+            return False
+        changes = Changes.between(self.holds, scene)
+        self.scene.update(scene, changes)
+        self.holds = scene
+        return changes.any
+
+    def free(self) -> None:
+        self.renderer.free()
+        self.scene.free()
+
+
+class Session:
+    """One viewport or one final render. ``free`` it on the thread that has the GPU context."""
+
+    def __init__(self) -> None:
+        self.scene = Scene()
+        self.status = Status()
+        self._gpu: _Gpu | None = None
+        self._picture: Picture | None = None
+        SESSIONS.alive.add(self)
+
+    def sync(self, depsgraph, *, for_viewport: bool, visible: Callable[[Any], bool] | None = None) -> None:
+        """Read the depsgraph: CPU work, on any thread. Raises SceneError where nothing can be rendered."""
+        self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, visible=visible)
+        self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
+        self.status.error = ""
+        SESSIONS.newest = self.status
+
+    def picture(self, view: View, settings: Settings) -> Picture:
+        """Bring the GPU up to date; the last picture if scene, view and settings are still the same, else an empty one.
+
+        Raises DeviceError without a usable GPU and RenderError for a picture that the GPU cannot hold.
+        """
+        gpu = self._ready()
+        changed = gpu.upload(self.scene)
+        old = self._picture
+        if old and not changed and old.is_for(view, settings):
+            return old
+        self._picture = None
+        if old:
+            old.free()
+        frame = gpu.renderer.begin(view, settings)
+        self._picture = Picture(gpu.device, gpu.scene, gpu.renderer, frame, view, settings, self.status)
+        return self._picture
+
+    def rsm_buffers(self, settings: Settings) -> list[RsmBuffers]:
+        """Every light's reflective shadow map, for the scene of the last sync."""
+        gpu = self._ready()
+        gpu.upload(self.scene)
+        return gpu.renderer.rsm_buffers(gpu.scene, settings)
+
+    def free(self) -> None:
+        """Give back all GPU memory; the next picture starts from nothing. Harmless when repeated."""
+        gpu, picture, self._gpu, self._picture = self._gpu, self._picture, None, None
+        if picture:
+            picture.free()
+        if gpu:
+            gpu.free()
+
+    def _ready(self) -> _Gpu:
+        SESSIONS.free_orphans()
+        if self._gpu is None:
+            self._gpu = _Gpu()
+            self.status.device = self._gpu.device.name
+        return self._gpu
+
+
+class Sessions:
+    """What outlives every engine object.
+
+    Blender destroys an engine object on any thread, mostly without a GPU context: its session then waits among the
+    orphans for the next moment when GPU memory can be freed.
+    """
+
+    def __init__(self) -> None:
+        self.alive: weakref.WeakSet[Session] = weakref.WeakSet()
+        self.orphans: deque[Session] = deque()
+        self.newest = Status()  # of the session that rendered last, for the panel
+
+    def free_orphans(self) -> None:
+        """Free the sessions whose engine is gone. To be called on the main thread."""
+        while self.orphans:
+            self.orphans.popleft().free()
+
+    def free_all(self) -> None:
+        """Free every session, whether its engine is alive or not."""
+        self.free_orphans()
+        for session in list(self.alive):
+            session.free()
+        self.newest = Status()
+
+
+# The one piece of module-level state beside the device's shader cache; the class says why there has to be one.
+SESSIONS = Sessions()
+
+
+def read_settings(scene, *, viewport: bool) -> Settings:
+    """The values of ``scene.rebound``; the viewport's own where a setting has them."""
+    group = scene.rebound
+
+    def value(name, setting):
+        own = viewport and setting.viewport_default is not None
+        return getattr(group, f"viewport_{name}" if own else name)
+
+    return Settings({name: value(name, setting) for name, setting in named_settings()})
+
+
+def same_view(a: View, b: View) -> bool:
+    """True if both views show the same pixels."""
+    return (
+        (a.width, a.height) == (b.width, b.height)
+        and np.array_equal(a.view_from_world, b.view_from_world)
+        and np.array_equal(a.clip_from_view, b.clip_from_view)
+    )
+
+
+def _missing(scene: Scene) -> tuple[str, ...]:
+    """A line for what makes a picture empty or dark though nothing is wrong with it."""
+    if not scene.instances:
+        return ("The scene has nothing to draw: the picture shows the background only",)
+    if not scene.lights:
+        return ("The scene has no light: the picture shows emission and the background only",)
+    return ()

@@ -1,0 +1,78 @@
+"""A 3D viewport: syncs a session, draws its picture better with every redraw, and shows an error as text."""
+
+from __future__ import annotations
+
+import textwrap
+
+import blf
+import gpu
+from mathutils import Matrix
+
+from .scene.cameras import region_view
+from .session import Session, read_settings
+from .settings import Settings
+
+# Seconds of work between two redraws once there is a picture; navigation waits no longer than this.
+SECONDS_PER_DRAW = 0.1
+TEXT_SIZE = 14  # pixels at a display scale of 1
+
+
+class Viewport:
+    """What one RenderEngine object of a viewport holds."""
+
+    def __init__(self) -> None:
+        self.session = Session()
+        self.error = ""
+        self.progress = ""  # one line for Blender to show in the corner
+        self.unfinished = False  # True if another redraw would make the picture better
+        self._synced = False
+        self._failed_for: tuple[Settings, int, int] | None = None  # what is not tried again before an edit
+
+    def update(self, context, depsgraph) -> None:
+        """Blender's data changed. CPU work only."""
+        space = context.space_data
+        self.error, self._failed_for, self._synced = "", None, False
+        self.session.sync(depsgraph, for_viewport=True, visible=lambda obj: obj.visible_in_viewport_get(space))
+        self._synced = True
+
+    def draw(self, context, depsgraph) -> None:
+        """Work on the picture for a bounded time and draw it."""
+        view = region_view(context.region, context.region_data)
+        settings = read_settings(depsgraph.scene, viewport=True)
+        attempt = (settings, view.width, view.height)
+        if not self._synced or attempt == self._failed_for:
+            return
+        self._failed_for = attempt  # until it went well
+        picture, wanted = self.session.picture(view, settings), int(settings["samples"])
+        if picture.samples < wanted:
+            picture.advance(SECONDS_PER_DRAW)
+        picture.show()
+        self._failed_for, self.error = None, ""
+        self.unfinished = picture.samples < wanted
+        self.progress = f"Sample {picture.samples}/{wanted}"
+
+    def fail(self, message: str) -> None:
+        """Show ``message`` until the next edit, which tries again from nothing."""
+        self.error = self.session.status.error = message
+        self.progress, self.unfinished = "", False
+        self.session.free()
+
+    def draw_error(self, context) -> None:
+        """The error as text in the middle of the region, if there is one."""
+        if not self.error:
+            return
+        region = context.region
+        lines = textwrap.wrap(f"Rebound: {self.error}", max(region.width // TEXT_SIZE * 2 - 4, 20))
+        with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():  # type: ignore[attr-defined]
+            gpu.matrix.load_identity()
+            gpu.matrix.load_projection_matrix(_pixel_space(region.width, region.height))
+            blf.size(0, TEXT_SIZE)
+            blf.color(0, 1.0, 0.6, 0.2, 1.0)
+            for number, line in enumerate(lines):
+                blf.position(0, TEXT_SIZE, region.height / 2 - number * 1.5 * TEXT_SIZE, 0)
+                blf.draw(0, line)
+
+
+def _pixel_space(width: int, height: int) -> Matrix:
+    """Projection from pixels of a region, origin at its lower left, to clip space."""
+    return Matrix(((2 / width, 0, 0, -1), (0, 2 / height, 0, -1), (0, 0, -1, 0), (0, 0, 0, 1)))
