@@ -87,7 +87,7 @@ class BlenderDevice(Device):
             options["layers"] = texture.layers
         is_integer = texture.info.scalar != "FLOAT"
         if data is not None and not is_integer:
-            values = blender_convert.upload_values(texture, data)
+            values = blender_convert.upload_values(texture, data, encodes_srgb=_IS_4_5 and self._backend == "VULKAN")
             options["data"] = gpu.types.Buffer("FLOAT", values.size, values)
         texture.handle = gpu.types.GPUTexture(texture.size, **options)
         if _HAS_SAMPLER_STATE and not is_integer and not texture.info.is_depth:

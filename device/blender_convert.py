@@ -12,12 +12,19 @@ if TYPE_CHECKING:
     from .blender import BlenderDevice
 
 
-def upload_values(texture: Texture, data: np.ndarray) -> np.ndarray:
-    """The flat float32 array that makes Blender store ``data``: it takes nothing but floats."""
-    if texture.info.is_8_bit:
-        # Some drivers round, some truncate: aim between a byte and the next half.
-        return (np.minimum(data + np.float32(0.25), 255.0) / np.float32(255.0)).astype(np.float32).ravel()
-    return data.ravel()
+def upload_values(texture: Texture, data: np.ndarray, *, encodes_srgb: bool) -> np.ndarray:
+    """The flat float32 array that makes Blender store ``data``: it takes nothing but floats.
+
+    encodes_srgb: the backend takes the values of an SRGB8_A8 texture for linear ones (Vulkan in Blender 4.5).
+    """
+    if not texture.info.is_8_bit:
+        return data.ravel()
+    # Some drivers round, some truncate: aim between a byte and the next half.
+    values = np.minimum(data + np.float32(0.25), 255.0) / np.float32(255.0)
+    if encodes_srgb and texture.format == "SRGB8_A8":
+        rgb = values[..., :3]
+        values[..., :3] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return np.ascontiguousarray(values, np.float32).ravel()
 
 
 def upload_integers(device: "BlenderDevice", texture: Texture, data: np.ndarray) -> None:
