@@ -29,12 +29,12 @@ class ProgressLine(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)
-        self._start = self._last = time.monotonic()
+        self._last = time.monotonic()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one message; warnings and errors keep a line of their own."""
         now = time.monotonic()
-        text = f"render: {now - self._start:5.1f} s  {record.getMessage()}"
+        text = f"render: {record.getMessage()}"
         if record.levelno >= logging.WARNING:
             print(f"\r\033[K{text}" if sys.stdout.isatty() else text, flush=True)
         elif sys.stdout.isatty():
