@@ -12,6 +12,10 @@ from .errors import SceneError
 Border = tuple[int, int, int, int]  # left, bottom, right, top in pixels of the full picture; right and top excluded
 
 
+# Metres; Blender clamps infinity to the largest float, and beyond this a squared distance overflows single precision.
+FARTHEST = 1e18
+
+
 def active_camera(depsgraph, engine=None):
     """The evaluated camera that the picture is taken with. Raises SceneError where there is none."""
     scene = depsgraph.scene_eval
@@ -89,8 +93,8 @@ def window_from_full(border: Border, width: int, height: int) -> Array:
 def _rigid_inverse(world: Array, name: str) -> Array:
     """The inverse of a camera's world matrix with its scale taken out, as Blender does."""
     scale = np.linalg.norm(world[:3, :3], axis=0)
-    if not np.isfinite(world).all() or not (scale > 1e-20).all():
-        raise SceneError(f"Camera '{name}' has a zero scale or a transform that is not finite: reset its scale and location")
+    if not np.abs(world).max() < FARTHEST or not (scale > 1e-20).all():  # the first is false for NaN
+        raise SceneError(f"Camera '{name}' has a zero scale or is not at a finite place: reset its scale and location")
     rigid = world.copy()
     rigid[:3, :3] /= scale
     if math.isclose(float(np.linalg.det(rigid[:3, :3])), 0.0, abs_tol=1e-6):

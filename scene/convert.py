@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 
 import numpy as np
 
-from .cameras import camera_warning
+from .cameras import FARTHEST, camera_warning
 from .data import Array, Instance, Light, Mesh, Scene, Visibility
 from .errors import SceneError
 from .images import ImageReader
@@ -15,9 +15,6 @@ from .materials import MaterialTable, read_world
 from .meshes import content_key, mesh_key, read_mesh
 
 __all__ = ["SceneError", "convert_scene"]
-
-# Metres; Blender clamps infinity to the largest float, and beyond this a squared distance overflows single precision.
-FARTHEST = 1e18
 
 UNSHOWN_TYPES = {
     "CURVES": "hair curves",
