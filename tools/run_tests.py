@@ -17,11 +17,12 @@ from pathlib import Path
 import passed_before
 from environments import PYTHON_OF_BLENDER, ROOT, venv_path, venv_python
 
-# Suite -> pytest arguments. `slow` is for `make test-all`, on OpenGL.
+# Suite -> pytest arguments. The slow ones are for `make test-all`, on OpenGL.
 SUITES = {
     "plain": ["tests/unit", "tests/headless", "-m", "not slow"],
     "blender": ["tests/blender", "-m", "not slow"],
-    "slow": ["tests/blender", "-m", "slow"],
+    "plain, slow": ["tests/unit", "tests/headless", "-m", "slow"],
+    "blender, slow": ["tests/blender", "-m", "slow"],
 }
 _NOTHING_COLLECTED = 5
 
@@ -46,7 +47,7 @@ class Outcome:
 
 def run(blender: str, backend: str, suite: str) -> Outcome:
     """Run one suite in a process of its own. A process that dies without a report counts as one failure."""
-    report = ROOT / ".cache" / f"{blender}-{backend}-{suite}.xml"
+    report = ROOT / ".cache" / f"{blender}-{backend}-{suite.replace(', ', '-')}.xml"
     report.parent.mkdir(exist_ok=True)
     report.unlink(missing_ok=True)
     print(f"\n=== Blender {blender}, {backend}, suite {suite}", flush=True)
