@@ -11,6 +11,7 @@ import bpy
 
 from .device.interface import DeviceError
 from .final_render import render as render_final
+from .gpu_probe import missing_gpu
 from .main_thread import MainThreadError
 from .render_result import register_passes
 from .renderer import RenderError
@@ -35,11 +36,15 @@ class ReboundEngine(bpy.types.RenderEngine):
     # In background this is the only way to a GPU context. In a window it would freeze the interface (main_thread.py).
     bl_use_gpu_context = bpy.app.background
 
+    missing_gpu = ""  # why there is no GPU in background, see _stand_down_without_gpu
+
     def update_render_passes(self, scene=None, renderlayer=None):
         register_passes(self, scene, renderlayer)
 
     def render(self, depsgraph):
         with _boundary(self._fail):
+            if self.missing_gpu:
+                raise DeviceError(self.missing_gpu)
             render_final(self, depsgraph)
 
     def view_update(self, context, depsgraph):
@@ -85,11 +90,28 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
+@bpy.app.handlers.persistent
+def _stand_down_without_gpu(scene, _depsgraph=None) -> None:
+    """Before a background render: where Blender would crash starting its GPU, have render() called without one.
+
+    Blender reads ``bl_use_gpu_context`` when the class is registered and then never asks again.
+    """
+    missing = missing_gpu() if scene.render.engine == ReboundEngine.bl_idname else ""
+    if missing:
+        bpy.utils.unregister_class(ReboundEngine)
+        ReboundEngine.missing_gpu, ReboundEngine.bl_use_gpu_context = missing, False
+        bpy.utils.register_class(ReboundEngine)
+
+
 def register() -> None:
+    if bpy.app.background:
+        bpy.app.handlers.render_init.append(_stand_down_without_gpu)
     bpy.utils.register_class(ReboundEngine)
 
 
 def unregister() -> None:
+    if _stand_down_without_gpu in bpy.app.handlers.render_init:
+        bpy.app.handlers.render_init.remove(_stand_down_without_gpu)
     SESSIONS.free_all()
     if getattr(ReboundEngine, "is_registered"):  # noqa: B009  unknown to Blender's stubs
         bpy.utils.unregister_class(ReboundEngine)

@@ -42,6 +42,5 @@ def register() -> None:
 
 def unregister() -> None:
     # Blender disables every extension before it finalises Python: a status that is already set has to survive this.
-    handlers = bpy.app.handlers.render_cancel
-    for handler in [h for h in handlers if h.__name__ == _on_render_cancel.__name__ and h.__module__ == __name__]:
-        handlers.remove(handler)
+    if _on_render_cancel in bpy.app.handlers.render_cancel:
+        bpy.app.handlers.render_cancel.remove(_on_render_cancel)

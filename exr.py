@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-# Channel names by the number of channels of a layer.
-_SUFFIXES = {1: ("V",), 2: ("X", "Y"), 3: ("X", "Y", "Z"), 4: ("R", "G", "B", "A")}
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One layer of a file: its channels' letters, one each, and (h, w, channels) floats, row 0 at the bottom."""
+
+    channels: str
+    pixels: np.ndarray
 
 
 class ExrError(RuntimeError):
@@ -20,8 +26,8 @@ def layer_name(name: str) -> str:
     return name.replace(".", "_")
 
 
-def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
-    """Write (h, w, channels) float arrays, row 0 at the bottom, as 32-bit channels "<layer>.X" and so on.
+def write_layers(path: Path, layers: Mapping[str, Layer]) -> None:
+    """Write layers by name as 32-bit channels "<name>.X" and so on.
 
     Layers of one size share a part of the file, so that most files have one part, as every program expects. Raises
     ExrError where the OpenEXR wheel is missing or the file cannot be written.
@@ -33,8 +39,8 @@ def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
             "The Python package OpenEXR is missing: install Rebound from its zip file, which carries it"
         ) from error
     by_size: dict[tuple[int, int], dict[str, np.ndarray]] = {}
-    for name, array in layers.items():
-        by_size.setdefault(array.shape[:2], {}).update(_channels(name, array))
+    for name, layer in layers.items():
+        by_size.setdefault(layer.pixels.shape[:2], {}).update(_channels(name, layer))
     parts = [
         OpenEXR.Part({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels, f"{w} x {h}")
         for (h, w), channels in by_size.items()
@@ -45,8 +51,7 @@ def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
         raise ExrError(f"Cannot write '{path}': {error}") from error
 
 
-def _channels(layer: str, array: np.ndarray) -> dict[str, np.ndarray]:
+def _channels(name: str, layer: Layer) -> dict[str, np.ndarray]:
     """EXR counts its rows from the top."""
-    flipped = array[::-1].astype(np.float32)
-    suffixes = _SUFFIXES[array.shape[2]]
-    return {f"{layer}.{suffix}": np.ascontiguousarray(flipped[..., i]) for i, suffix in enumerate(suffixes)}
+    planes = np.moveaxis(layer.pixels[::-1].astype(np.float32), 2, 0)
+    return {f"{name}.{c}": np.ascontiguousarray(plane) for c, plane in zip(layer.channels, planes, strict=True)}

@@ -9,12 +9,14 @@ import bpy
 import gpu
 
 from ..device.interface import DeviceError
-from ..exr import ExrError, layer_name, write_layers
-from ..renderer import RenderError
+from ..exr import ExrError, Layer, layer_name, write_layers
+from ..gpu_probe import missing_gpu
+from ..renderer import RenderError, RsmBuffers
 from ..scene.errors import SceneError
 from ..session import Session, read_settings
 
 LOGGER = logging.getLogger("rebound")
+CHANNELS = {"depth": "Z", "position": "XYZ", "normal": "XYZ", "flux": "RGB"}
 USER_FAULTS = (SceneError, RenderError, DeviceError, ExrError)
 
 
@@ -61,12 +63,12 @@ def save_rsm_buffers(depsgraph, path: Path) -> int:
     return len(buffers)
 
 
-def _layers(buffers) -> dict:
-    """Layer name -> array: "Spot.position"; a point light's faces come in between: "Point.+X.position"."""
+def _layers(buffers: list[RsmBuffers]) -> dict[str, Layer]:
+    """Layers by name: "Spot.position"; a point light's faces come in between: "Point.+X.position"."""
     result = {}
     for buffer in buffers:
         prefix = ".".join(layer_name(part) for part in (buffer.light, buffer.face) if part)
-        result |= {f"{prefix}.{name}": array for name, array in buffer.layers.items()}
+        result |= {f"{prefix}.{name}": Layer(CHANNELS[name], array) for name, array in buffer.layers.items()}
     return result
 
 
@@ -74,11 +76,11 @@ def _ensure_gpu() -> None:
     """Blender gives operators a GPU context in a window; in background only when asked, and only since 5.2."""
     if not bpy.app.background:
         return
+    missing = missing_gpu()
+    if missing:
+        raise DeviceError(missing)
     if hasattr(gpu, "init"):
-        try:
-            gpu.init()
-        except SystemError as error:
-            raise DeviceError(f"Blender found no usable GPU: {error}") from error
+        gpu.init()
         return
     try:
         gpu.platform.backend_type_get()
