@@ -40,7 +40,7 @@ class GpuScene:
         self.scene = Scene()
         self.uploads: Counter[str] = Counter()
         self.draws: tuple[Draw, ...] = ()
-        self.bounds = np.zeros((2, 3))
+        self.boxes = np.zeros((1, 2, 3))  # world boxes of all instances, a point at the origin for an empty scene
         self.revision = 0  # grows with every update that changes something
         self._moved: list[tuple[int, np.ndarray]] = []
         self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
@@ -120,10 +120,11 @@ class GpuScene:
         groups: dict[tuple, list[Instance]] = defaultdict(list)
         for instance in scene.instances:
             groups[instance.mesh, instance.materials, instance.visibility].append(instance)
-        draws, matrices, wanted = [], [], set()
+        draws, matrices, every_box, wanted = [], [], [], set()
         for (mesh_key, materials, visibility), members in groups.items():
             mesh = scene.meshes[mesh_key]
             boxes = np.array([world_bounds(member, scene) for member in members])
+            every_box.append(boxes)
             bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
             for slot, first, count in mesh.slots:
                 material = materials[min(slot, len(materials) - 1)]
@@ -138,8 +139,7 @@ class GpuScene:
         packed = INSTANCE.pack_arrays(len(matrices), world_from_object=np.array(matrices).reshape(-1, 4, 4))
         self.instance_table = replace_table(self.device, packed, self.instance_table)
         self.draws = tuple(draws)
-        every = [draw.bounds for draw in draws]
-        self.bounds = np.stack([np.min(every, 0)[0], np.max(every, 0)[1]]) if every else np.zeros((2, 3))
+        self.boxes = np.concatenate(every_box) if every_box else np.zeros((1, 2, 3))
 
     def _vertices(self, mesh: Mesh, maps: UvMaps) -> Vertices:
         key = (mesh.key, maps)

@@ -63,7 +63,7 @@ class DirectLight:
             source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index))
             faces = ()
             if light.casts_shadow:
-                faces = light_faces(light, inputs.gpu_scene.bounds, source if sampled else None)
+                faces = light_faces(light, inputs.gpu_scene.boxes, source if sampled else None)
             rows.append(light_row(light, source, not sampled, len(tiles), len(faces)))
             tiles += [MapTile(light.key, index, face) for face in faces]
         self.maps.lay_out(tiles, resolution)

@@ -24,6 +24,9 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   vec3 d = P - light.map_origin;
   vec3 local = vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z));
   MapFace face = map_face_fetch(face_tx, light.first_face + map_face_of(light.face_count, local));
+  if (light.face_count == 2 && !map_holds(face, map_position(face, P))) {
+    face = map_face_fetch(face_tx, light.first_face + 1);
+  }
   if (!map_holds(face, map_position(face, P))) {
     return 1.0;
   }

@@ -13,6 +13,7 @@ vec2 map_uv(MapFace face, vec3 p)
   return 0.5 + 0.5 * face.scale * (face.perspective != 0 ? p.xy / p.z : p.xy);
 }
 
+/* Whether the position p (in the face's frame) has a place in the map. */
 bool map_holds(MapFace face, vec3 p)
 {
   if (face.perspective != 0 && p.z <= face.near) {
@@ -38,11 +39,12 @@ float map_closeness(MapFace face, float linear_depth)
   return face.perspective != 0 ? 1.0 / max(linear_depth, 1e-9) : -linear_depth;
 }
 
-/* Which of a light's faces looks at the direction `d` (in the light's frame, from the light). Five faces are the
- * half cube around -Z in the order -Z +X -X +Y -Y, six are the whole cube with +Z last. */
+/* Which of a light's faces looks at the direction `d` (in the light's frame, from the light). One or two faces: the
+ * first (a sun's second holds what its first does not). Five are the half cube around -Z in the order -Z +X -X +Y -Y,
+ * six the whole cube with +Z last. */
 int map_face_of(int face_count, vec3 d)
 {
-  if (face_count == 1) {
+  if (face_count <= 2) {
     return 0;
   }
   vec3 a = abs(d);

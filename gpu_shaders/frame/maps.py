@@ -1,7 +1,8 @@
 """The faces a light looks at the scene through, and their tiles in an atlas. Plain numpy, no GPU.
 
-A spot has one perspective face, a sun one orthographic face fitted to the scene, a point light the six faces of a
-cube, an area light (and a spot too wide for one face) the half cube before it.
+A spot has one perspective face, a point light the six faces of a cube, an area light (and a spot too wide for one
+face) the half cube before it. A sun has one orthographic face fitted to the scene; where a few huge objects (a ground plane)
+would take nearly all of its texels, it has one fitted to the rest and a second for everything.
 """
 
 from __future__ import annotations
@@ -21,6 +22,12 @@ CONE_MARGIN = 1.02
 NEAR_OF_FAR = 1e-4
 # float32 rounding of positions and matrices, in parts of the largest coordinate involved.
 ROUNDING = 3e-6
+
+# A sun gets a second face when leaving out at most so many objects makes its picture so many times smaller.
+MOST_HUGE_OBJECTS = 4
+WORTHWHILE_SHRINK = 16.0
+# The narrow face reaches this part of its width further: the ground around an object is what bounces most onto it.
+NEAR_MARGIN = 0.5
 
 _CUBE = {  # forward, up: in the light's frame, in the order of map_face_of() in map_lib.glsl
     "-Z": ((0, 0, -1), (0, 1, 0)),
@@ -81,14 +88,15 @@ def light_axes(light: Light) -> np.ndarray:
     return axes / np.where(lengths > 0, lengths, 1.0)
 
 
-def light_faces(light: Light, bounds: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
-    """The faces of one light for a scene within ``bounds`` (2, 3).
+def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
+    """The faces of one light for a scene of instances within ``boxes`` (n, 2, 3), n > 0.
 
     ``source`` moves the light to a sample of its emitter: a point, for a sun the unit direction to it.
     """
     axes = light_axes(light)
     if light.kind is LightKind.SUN:
-        return (_sun_face(axes, bounds, axes[:, 2] if source is None else source),)
+        return _sun_faces(axes, boxes, axes[:, 2] if source is None else source)
+    bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
     origin = np.asarray(light.world_from_light[:3, 3] if source is None else source, np.float64)
     farthest = np.linalg.norm(np.maximum(abs(bounds[0] - origin), abs(bounds[1] - origin)))
     far = max(float(farthest) * 1.001, 1e-6)
@@ -113,24 +121,54 @@ def _looking(origin, forward, up) -> np.ndarray:
     return matrix
 
 
-def _sun_face(axes, bounds, to_sun) -> Face:
-    """Orthographic, as small as the scene's bounds seen along the light allow; the view has no part in it."""
+def _sun_faces(axes, boxes, to_sun) -> tuple[Face, ...]:
+    """Orthographic, as small as the scene seen along the light allows; the view has no part in it."""
     forward = -np.asarray(to_sun, np.float64)
     up = axes[:, 1] - forward * (axes[:, 1] @ forward)
     length = np.linalg.norm(up)
     up = up / length if length > 1e-6 else _any_perpendicular(forward)
-    corners = np.array([[bounds[(i >> k) & 1][k] for k in range(3)] for i in range(8)])
     rows = np.stack([np.cross(forward, up), up, forward])
-    seen = corners @ rows.T
-    lower, upper = seen.min(0), seen.max(0)
+    centers = boxes.mean(1) @ rows.T
+    halves = 0.5 * (boxes[:, 1] - boxes[:, 0]) @ np.abs(rows).T
+    lower, upper = centers - halves, centers + halves
+    everything = lower.min(0), upper.max(0)
+    reach = float(np.abs(boxes).max())
+    kept = _without_huge(lower, upper)
+    if kept is None:
+        return (_sun_face(rows, *everything, reach, ""),)
+    # The narrow picture keeps the whole depth: what blocks the light may be huge.
+    low, high = lower[kept].min(0), upper[kept].max(0)
+    margin = NEAR_MARGIN * (high - low)
+    low, high = np.maximum(low - margin, everything[0]), np.minimum(high + margin, everything[1])
+    low[2], high[2] = everything[0][2], everything[1][2]
+    return _sun_face(rows, low, high, reach, "Near"), _sun_face(rows, *everything, reach, "Far")
+
+
+def _without_huge(lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    """Indices of the boxes that remain when the fewest huge ones are left out, None where that gains too little."""
+    extent = (upper - lower)[:, :2]
+    order = np.argsort(extent.max(1))
+    whole = _area(lower, upper)
+    for left_out in range(1, min(MOST_HUGE_OBJECTS, len(order) - 1) + 1):
+        kept = order[:-left_out]
+        if whole > WORTHWHILE_SHRINK * _area(lower[kept], upper[kept]):
+            return kept
+    return None
+
+
+def _area(lower: np.ndarray, upper: np.ndarray) -> float:
+    return float(np.prod((upper.max(0) - lower.min(0))[:2]))
+
+
+def _sun_face(rows, lower, upper, reach: float, name: str) -> Face:
     half = np.maximum(0.5 * (upper - lower), 1e-6) * 1.001
     center = 0.5 * (lower + upper)
     depth = 2.0 * half[2]
     matrix = np.eye(4)
     matrix[:3, :3] = rows
     matrix[:3, 3] = -center[0], -center[1], half[2] - center[2]
-    epsilon = ROUNDING * max(1.0, float(np.abs(bounds).max(initial=0.0)) / depth)
-    return Face("", matrix, (1.0 / half[0], 1.0 / half[1]), 0.0, depth, epsilon, False)
+    epsilon = ROUNDING * max(1.0, reach / depth)
+    return Face(name, matrix, (1.0 / half[0], 1.0 / half[1]), 0.0, depth, epsilon, False)
 
 
 def _any_perpendicular(v: np.ndarray) -> np.ndarray:

@@ -69,7 +69,7 @@ class ReflectiveShadowMaps(LightMaps):
         tiles: list[MapTile] = []
         rows = []
         for index, light in enumerate(gpu_scene.scene.lights):
-            faces = light_faces(light, gpu_scene.bounds)
+            faces = light_faces(light, gpu_scene.boxes)
             row = _center_row(light, len(tiles), len(faces))
             look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
             rows.append(row)
@@ -93,7 +93,14 @@ class ReflectiveShadowMaps(LightMaps):
             pc_perspective=int(tile.face.perspective),
             pc_far=tile.face.far,
             pc_texel_measure=tile.face.texel_measure / viewport[2] ** 2,
+            face_tx=self.face_table,
+            pc_served=self._served_by(tile),
         )
+
+
+    def _served_by(self, tile: MapTile) -> int:
+        """Index of the face whose part of the scene this tile leaves to it: a sun's far face has a near one. Or -1."""
+        return self.tiles.index(tile) - 1 if tile.face.name == "Far" else -1
 
 
 def _center_row(light: Light, first_face: int, face_count: int) -> dict:

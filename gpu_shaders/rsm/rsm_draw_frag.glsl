@@ -2,6 +2,7 @@
  * lies there, and the flux it sends back. The flux takes the light through the texel times the albedo; the receiver's cosine is not in
  * it: it cancels against the surface's projected area. */
 #include "frame/light_lib.glsl"
+#include "frame/map_lib.glsl"
 #include "frame/surface_lib.glsl"
 
 /* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond this. */
@@ -27,6 +28,13 @@ void main()
   if (pc_reflects != 0) {
     albedo = surface_evaluate(
         material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv).albedo;
+  }
+  /* A sun's far map sends no light from where its near map does. */
+  if (pc_served >= 0) {
+    MapFace near_face = map_face_fetch(face_tx, pc_served);
+    if (map_holds(near_face, map_position(near_face, v_position))) {
+      albedo = vec3(0.0);
+    }
   }
   vec3 flux = light_intensity(light, -d) * measure * albedo;
   float area = measure * distance_squared / max(dot(geometric, d), RSM_GRAZING);

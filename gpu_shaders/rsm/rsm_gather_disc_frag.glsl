@@ -98,6 +98,11 @@ void main()
     g.face = light.first_face + map_face_of(light.face_count, local);
     MapFace face = map_face_fetch(rsm_face_tx, g.face);
     vec3 p = map_position(face, g.P);
+    if (light.face_count == 2 && !map_holds(face, p)) {
+      g.face++;
+      face = map_face_fetch(rsm_face_tx, g.face);
+      p = map_position(face, g.P);
+    }
     p.z = max(p.z, face.near);
     g.place = clamp(map_uv(face, p), vec2(0.0), vec2(1.0));
     sum += gather_light(g, light.first_face, light.face_count, sampling_hash(pixel, pc_seed + i));

@@ -11,8 +11,8 @@ DRAW = Shader(
     inputs=MESH_INPUTS,
     varyings=MESH_VARYINGS,
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4"},
-    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D"},
-    structs=(INSTANCE, MATERIAL, LIGHT),
+    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
+    structs=(INSTANCE, MATERIAL, LIGHT, MAP_FACE),
     constants={
         "pc_clip_from_world": "MAT4",
         "pc_first_instance": "INT",
@@ -22,6 +22,7 @@ DRAW = Shader(
         "pc_perspective": "INT",
         "pc_far": "FLOAT",
         "pc_texel_measure": "FLOAT",  # see rsm_draw_frag.glsl
+        "pc_served": "INT",
     },
     depth_write=True,
 )
