@@ -6,7 +6,8 @@ or a draw handler in the interface, or after gpu.init() (5.2) in background.
 """
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -15,6 +16,7 @@ import numpy as np
 
 from . import binding, blender_convert
 from .blender_log import PROBE, failed_stage, probed_line, run_captured, trace
+from .formats import FORMATS
 from .interface import Device, DeviceError, DrawState, Program, Target, Texture, Vertices, Viewport
 from .shader import Shader, ShaderError, Source
 
@@ -61,8 +63,8 @@ class BlenderDevice(Device):
 
     def adopt(self, handle: Any) -> Texture:
         """Wrap a 2D texture that Blender made (gpu.texture.from_image) for use as a sampler. Not freed by ``free``."""
-        texture = Texture((handle.width, handle.height), "RGBA16F")
-        texture.format, texture.handle = handle.format, handle
+        texture = Texture((handle.width, handle.height), handle.format if handle.format in FORMATS else "RGBA16F")
+        texture.handle = handle
         return texture
 
     def draw_to_current(self, shader: Shader, **resources: Any) -> None:
@@ -89,7 +91,10 @@ class BlenderDevice(Device):
         if data is not None and not is_integer:
             values = blender_convert.upload_values(texture, data, encodes_srgb=_IS_4_5 and self._backend == "VULKAN")
             options["data"] = gpu.types.Buffer("FLOAT", values.size, values)
-        texture.handle = gpu.types.GPUTexture(texture.size, **options)
+        try:
+            texture.handle = gpu.types.GPUTexture(texture.size, **options)
+        except (RuntimeError, MemoryError) as error:
+            raise DeviceError(f"No GPU memory for {texture}: {error}") from error
         if _HAS_SAMPLER_STATE and not is_integer and not texture.info.is_depth:
             texture.handle.filter_mode(texture.filter == "LINEAR")
             texture.handle.extend_mode("REPEAT" if texture.repeat else "EXTEND")
@@ -103,8 +108,9 @@ class BlenderDevice(Device):
         self._cleared = True
         if info.is_depth:
             # GPUTexture.clear of a depth texture crashes Blender on Vulkan up to 5.0.
-            with gpu.types.GPUFrameBuffer(depth_slot=texture.handle).bind():
-                gpu.state.active_framebuffer_get().clear(depth=color[0])
+            framebuffer = gpu.types.GPUFrameBuffer(depth_slot=texture.handle)
+            with _bound(framebuffer):
+                framebuffer.clear(depth=color[0])
             return
         cast = float if info.scalar == "FLOAT" else int
         texture.handle.clear(format=info.scalar, value=tuple(cast(c) for c in color[: info.channels]))
@@ -181,9 +187,7 @@ class BlenderDevice(Device):
 
     def _begin(self, program: Program, target: Target | None, state: DrawState, viewport: Viewport | None) -> None:
         if target is not None:
-            if target.handle is None:
-                raise ValueError(f"Shader {program.shader.name}: the target was freed")
-            self._bound = target.handle.bind()
+            self._bound = _bound(target.handle)
             self._bound.__enter__()
             # On OpenGL a framebuffer keeps its viewport from bind to bind, on Vulkan it does not.
             gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))
@@ -240,6 +244,17 @@ class BlenderDevice(Device):
 
 _NOTHING = Shader("device_barrier", compute="device/barrier_comp.glsl", local_size=(1, 1, 1),
                   files={"device/barrier_comp.glsl": "void main() {}\n"})  # fmt: skip
+
+
+@contextmanager
+def _bound(framebuffer: Any) -> Iterator[None]:
+    """Bind a framebuffer; afterwards the one before is bound again, with its viewport (which Vulkan forgets)."""
+    viewport = gpu.state.viewport_get()
+    try:
+        with framebuffer.bind():
+            yield
+    finally:
+        gpu.state.viewport_set(*viewport)
 
 
 def _set_state(state: DrawState) -> None:

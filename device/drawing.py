@@ -66,6 +66,8 @@ class Drawing:
             raise TypeError(f"Shader {shader.name}: unknown {', '.join(unknown)}")
         if target is not None:
             _check_target(shader, target, state, shared)
+        if viewport is not None and min(viewport[2:]) < 1:
+            raise ValueError(f"Shader {shader.name}: the viewport {tuple(viewport)} is empty")
         self._shared = shared
         self._rest = {n: None for n in program.setters if n not in shared}.keys()
 
@@ -125,6 +127,8 @@ def _check_inputs(shader: Shader, vertices: Vertices) -> None:
 
 
 def _check_target(shader: Shader, target: Target, state: DrawState, resources: Mapping[str, Any]) -> None:
+    if target.is_freed:
+        raise ValueError(f"Shader {shader.name}: the target or a texture of it was freed")
     if len(shader.outputs) > len(target.colors):
         raise TypeError(
             f"Shader {shader.name}: {len(shader.outputs)} outputs, the target has {len(target.colors)} colours"

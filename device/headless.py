@@ -22,7 +22,7 @@ _GL_SRGB8_ALPHA8 = 0x8C43
 _DEPTH_FUNCTIONS = {
     "LESS": "<", "LESS_EQUAL": "<=", "EQUAL": "==", "GREATER": ">", "GREATER_EQUAL": ">=", "ALWAYS": "1",
 }  # fmt: skip
-_LOG_LINE = re.compile(r"^\s*\d+[:(](\d+)[):]?\S*\s*:?\s*(.*)$")
+_LOG_LINE = re.compile(r"^\s*(?:ERROR: |WARNING: )?\d+[:(](\d+)[):]?\S*\s*:?\s*(.*)$")
 _LOG_STAGES = {"vertex_shader": "vertex", "fragment_shader": "fragment", "compute_shader": "compute"}
 
 
@@ -35,12 +35,13 @@ class HeadlessDevice(Device):
             self._ctx = ctx = moderngl.create_context(standalone=True, require=430, **options)
         except Exception as error:  # moderngl raises bare Exceptions
             raise DeviceError(f"No OpenGL 4.3 context: {error}") from error
-        ctx.gc_mode = None
+        ctx.gc_mode = "auto"  # what is dropped is freed, as in Blender
         renderer = ctx.info["GL_RENDERER"]
         self.name = f"OpenGL {renderer} (standalone)"
         self.is_software = bool(re.search("llvmpipe|softpipe|swrast|swiftshader", renderer, re.IGNORECASE))
         self.max_texture_size = min(16384, ctx.info["GL_MAX_TEXTURE_SIZE"])
         self._programs: dict[Shader, Program] = {}
+        self._attributeless: dict[Program, Any] = {}
 
     @property
     def error(self) -> str:
@@ -62,7 +63,8 @@ class HeadlessDevice(Device):
         if data is None:
             data = np.zeros(texture.shape, info.dtype)
         dtype = _DTYPES.get(format, "f1" if info.is_8_bit else "f4")
-        content = (data.astype(np.float16) if dtype == "f2" else data).tobytes()
+        with np.errstate(over="ignore"):  # what a half float cannot hold becomes infinite, as on a GPU
+            content = (data.astype(np.float16) if dtype == "f2" else data).tobytes()
         if info.is_depth:
             handle = self._ctx.depth_texture(size, content, alignment=1)
             handle.compare_func = ""  # read plain depths, not comparisons
@@ -169,10 +171,7 @@ class HeadlessDevice(Device):
             self._ctx.memory_barrier()
 
     def _draw(self, program: Program, vertices: Vertices | None, first: int, count: int, instances: int) -> None:
-        if vertices is None:
-            cache: dict = self.__dict__.setdefault("_attributeless", {})
-        else:
-            cache = vertices.cache
+        cache = self._attributeless if vertices is None else vertices.cache
         vertex_array = cache.get(program)
         if vertex_array is None:
             vertex_array = cache[program] = self._vertex_array(program, vertices)
@@ -246,7 +245,7 @@ def _constant_setter(uniform: Any, type_name: str) -> Callable[[Any], None]:
 
 
 def _shader_error(shader: Shader, sources: Mapping[str, Any], log: str) -> ShaderError:
-    """Turn a driver's log ("0:12(3): error: ...", Mesa; "0(12) : error ...", NVIDIA) into file:line."""
+    """Trace a log of Mesa ("0:12(3): error: x"), NVIDIA ("0(12) : error x") or AMD ("ERROR: 0:12: x") to file:line."""
     stage, lines = shader.stages[-1], []
     for line in log.splitlines():
         stage = _LOG_STAGES.get(line.strip(), stage)

@@ -136,6 +136,8 @@ class Device(ABC):
         if len(colors) != len(target.colors) or any(len(c) != 4 for c in colors):
             raise ValueError(f"clear: expected RGBA, or one a slot for {len(target.colors)} slots; got {color}")
         self._check_idle(None)
+        if target.is_freed:
+            raise ValueError("clear: the target or a texture of it was freed")
         if viewport is None:
             self._clear(target, colors, depth)
             return

@@ -51,6 +51,12 @@ class Target:
         self.size: tuple[int, int] = (first.size[0], first.size[1])
         self.handle: Any = None
 
+    @property
+    def is_freed(self) -> bool:
+        """Whether it or a texture of it was freed."""
+        depth_freed = self.depth is not None and self.depth.handle is None
+        return self.handle is None or depth_freed or any(t.handle is None for t in self.colors)
+
 
 class Vertices:
     """Corner arrays of triangles, not indexed: three vertices a triangle."""

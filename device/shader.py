@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
 from . import standalone
+from .names import is_name
 from .source import ShaderError, Source, assemble
 from .structs import Struct
 
@@ -43,18 +44,6 @@ _DIMENSIONS = ("2D", "3D", "2D_ARRAY")
 SAMPLER_TYPES = tuple(f"{scalar}_{d}" for scalar in ("FLOAT", "INT", "UINT") for d in _DIMENSIONS)
 IMAGE_TYPES = SAMPLER_TYPES + tuple(f"{scalar}_{d}_ATOMIC" for scalar in ("INT", "UINT") for d in _DIMENSIONS)
 IMAGE_FORMATS = ("RGBA32F", "RGBA16F", "RG32F", "RG16F", "R32F", "R16F", "RGBA8", "RG8", "R8", "R32UI", "R32I")
-
-# Words some Blender version or backend refuses as an identifier.
-RESERVED = frozenset(
-    re.findall(
-        r"\w+",
-        "input output half common partition active filter buffer shared sample flat template this class union enum "
-        "typedef namespace using goto inline static long short public external interface fixed unsigned superp char "
-        "resource sampler2D sampler3D packed constant device thread threadgroup sampler texture2D main float int "
-        "uint bool vec2 vec3 vec4 mat3 mat4 in out inout void const return if else for while do break continue "
-        "discard switch case struct uniform attribute varying layout texture texelFetch ",
-    )
-)
 
 
 @dataclass(frozen=True)
@@ -288,8 +277,7 @@ class Shader:
             self._require(name not in seen, f"{name!r} is a define and in {seen.get(name)}")
 
     def _validate_name(self, what: str, name: str, seen: dict[str, str]) -> None:
-        valid = re.fullmatch(r"[A-Za-z]\w*", name) and "__" not in name and not name.startswith("gl_")
-        self._require(bool(valid) and name not in RESERVED, f"{what}: {name!r} cannot be a name in GLSL")
+        self._require(is_name(name), f"{what}: {name!r} cannot be a name in GLSL")
         self._require(name not in seen, f"{name!r} is in {what} and in {seen.get(name)}")
         seen[name] = what
 

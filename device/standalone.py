@@ -63,7 +63,9 @@ def _declarations(shader: "Shader", stage: str) -> list[str]:
         layout = f"binding = {slot}, {image.format.lower()}"
         lines.append(f"layout({layout}) restrict {access}uniform {image_type(image.type)} {name};")
     for slot, (name, struct) in enumerate(shader.uniforms.items()):
-        lines.append(f"layout(std140, binding = {slot}) uniform {name}_block {{ {struct.name} {name}; }};")
+        # Blender makes a macro of the name as well: a parameter or local of that name must fail here, too.
+        lines.append(f"layout(std140, binding = {slot}) uniform {name}_block {{ {struct.name} {name}_data; }};")
+        lines.append(f"#define {name} ({name}_data)")
     lines += [f"uniform {glsl_type(type_name)} {name};" for name, type_name in shader.constants.items()]
     return lines
 

@@ -18,6 +18,8 @@ from functools import cached_property
 
 import numpy as np
 
+from .names import is_name
+
 TEXEL_BYTES = 16
 # A table is a texture with one row an element; no GPU we support takes more rows.
 MAX_TABLE_ROWS = 16384
@@ -135,7 +137,7 @@ class Struct:
 
     def _column(self, field: Field, values: list) -> np.ndarray:
         try:
-            column = np.array(values, dtype=np.int64 if field.type == "int" else np.float32)
+            column = np.array(values, dtype=None if field.type == "int" and values else np.float32)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(f"Struct {self.name}, field {field.name!r}: {error}") from None
         if not values:
@@ -152,10 +154,12 @@ class Struct:
                 raise ValueError(f"Struct {self.name}: {problem} field(s) {', '.join(map(repr, found))}")
 
     def _check_ints(self, field: Field, values: np.ndarray, for_uniform: bool) -> None:
-        if values.size and values.dtype.kind not in "iub":
+        if not values.size:
+            return
+        if values.dtype.kind not in "iub":
             raise ValueError(f"Struct {self.name}, field {field.name!r}: expected integers, got {values.dtype}")
         bound = 2**31 - 1 if for_uniform else MAX_EXACT_INT
-        if values.size and np.abs(values.astype(np.int64)).max() > bound:
+        if np.abs(values.astype(np.int64)).max() > bound:
             raise ValueError(f"Struct {self.name}, field {field.name!r}: a value is beyond +-{bound}")
 
     # --- GLSL --------------------------------------------------------------------------------------------------------
@@ -197,7 +201,7 @@ def _lay_out(struct: str, fields: Mapping[str, str]) -> list[Field]:
     for name, type_name in fields.items():
         if type_name not in _TYPES:
             raise ValueError(f"Struct {struct}, field {name!r}: unknown type {type_name!r}; one of {', '.join(_TYPES)}")
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", name) or name.startswith("pad_"):
+        if not is_name(name) or name.startswith("pad_"):
             raise ValueError(f"Struct {struct}: a field cannot be named {name!r}")
         floats, alignment = _TYPES[type_name]
         offset = -(-end // alignment) * alignment

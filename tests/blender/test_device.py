@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The device contract on Blender's device, on the backend that the run asked for."""
 
+import bpy
+import gpu
+import numpy as np
 import pytest
 
+from rebound.device import DeviceError, DrawState
 from rebound.device.blender import BlenderDevice
 from rebound.tests.support.device_contract import *  # noqa: F403
+from rebound.tests.support.device_contract import fragment, show
 from rebound.tests.support.device_contract_draw import *  # noqa: F403
+from rebound.tests.support.device_contract_draw import canvas
 
 
 @pytest.fixture(scope="module")
@@ -16,3 +22,72 @@ def blender_device(gpu_backend):
 @pytest.fixture
 def device(blender_device):
     return blender_device
+
+
+# --- only in Blender -------------------------------------------------------------------------------------------------
+
+FADE = fragment("fade", "void main() { out_color = vec4(uv, pc_blue, 1.0); }", constants={"pc_blue": "FLOAT"})
+
+
+@pytest.fixture
+def screen(device):
+    """A bound framebuffer with a viewport of its own, as view_draw finds it: (texture, framebuffer)."""
+    texture = device.texture((8, 4), "RGBA32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=(texture.handle,))
+    with framebuffer.bind():
+        gpu.state.viewport_set(4, 0, 4, 4)
+        yield texture, framebuffer
+
+
+def test_draw_to_current_fills_the_viewport(device, screen):
+    device.draw_to_current(FADE, pc_blue=0.5)
+    values = device.read(screen[0])
+    assert not values[:, :4].any()
+    np.testing.assert_allclose(values[0, 4], [1 / 8, 1 / 8, 0.5, 1], atol=1e-6)
+    with pytest.raises(TypeError, match="fade.*missing pc_blue"):
+        device.draw_to_current(FADE)
+
+
+def test_work_leaves_framebuffer_viewport_and_state_alone(device, screen):
+    target = canvas(device, (16, 16), depth=True)
+    state = DrawState(depth_test="LESS_EQUAL", depth_write=True, blend="ADDITIVE", cull="BACK")
+    device.fullscreen(FADE, target, state=state, viewport=(1, 2, 3, 4), pc_blue=1.0)
+    device.clear(target, viewport=(0, 0, 2, 2))
+    device.read(target.colors[0])
+    device.finish()
+    assert gpu.state.active_framebuffer_get() == screen[1]
+    assert gpu.state.viewport_get() == (4, 0, 4, 4)
+    assert gpu.state.depth_test_get() == "NONE"
+    assert gpu.state.depth_mask_get() is False
+    assert gpu.state.blend_get() == "NONE"
+    device.draw_to_current(FADE, pc_blue=0.5)
+    assert device.read(screen[0])[..., 2].sum() == 0.5 * 16
+
+
+def test_adopted_image_is_read_scene_linear(device, clean_scene):
+    image = bpy.data.images.new("adopted", 2, 1)
+    image.pixels.foreach_set(np.array([1, 0, 0, 1, 0, 128 / 255, 0, 1], np.float32))
+    image.update()
+    shader = fragment(
+        "adopt", "void main() { out_color = texelFetch(a_tx, ivec2(gl_FragCoord.xy), 0); }",
+        samplers={"a_tx": "FLOAT_2D"},
+    )  # fmt: skip
+    values = show(device, shader, (2, 1), a_tx=device.adopt(gpu.texture.from_image(image)))
+    # 128 of 255 in sRGB is 0.2159 linear; the hardware's table is good to about 8 bits.
+    np.testing.assert_allclose(values[0], [[1, 0, 0, 1], [0, 0.2159, 0, 1]], atol=1e-3)
+
+
+def test_programs_outlive_a_device(device):
+    show(device, FADE, pc_blue=1.0)
+    assert BlenderDevice()._program(FADE) is device._program(FADE)
+
+
+def test_repeat_is_refused_where_blender_cannot(device):
+    if bpy.app.version >= (5, 2):
+        texture = device.texture((2, 1), "R32F", np.array([[1.0, 2.0]], np.float32), repeat=True)
+        shader = fragment("repeat", "void main() { out_color = texture(a_tx, vec2(1.25, 7.5)); }",
+                          samplers={"a_tx": "FLOAT_2D"})  # fmt: skip
+        assert show(device, shader, a_tx=texture)[0, 0, 0] == 1.0
+    else:
+        with pytest.raises(DeviceError, match="repeat"):
+            device.texture((2, 1), "R32F", repeat=True)

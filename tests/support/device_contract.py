@@ -127,6 +127,20 @@ def test_uniform_block_arrives_bit_exact(device):
         np.testing.assert_array_equal(show(device, shader, (7, 1), light=packed.tobytes())[0], values)
 
 
+def test_uniforms_and_constants_change_between_draws_without_waiting(device):
+    shader = fragment(
+        "changing", "void main() { out_color = light.from_world[0] + pc_add; }",
+        uniforms={"light": LIGHT}, constants={"pc_add": "VEC4"},
+    )  # fmt: skip
+    texture = device.texture((16, 1), "RGBA32F")
+    target = device.target([texture])
+    for x in range(16):
+        packed = LIGHT.pack([{**LIGHTS[0], "from_world": MATRIX * x}], for_uniform=True)
+        device.fullscreen(shader, target, viewport=(x, 0, 1, 1), light=packed, pc_add=(x, 0, 0, 0))
+    expected = np.arange(16)[:, None] * (MATRIX[:, 0] + [1, 0, 0, 0])
+    np.testing.assert_array_equal(device.read(texture)[0], expected)
+
+
 def test_one_struct_as_table_and_block(device):
     shader = fragment(
         "both",

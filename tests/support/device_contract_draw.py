@@ -314,6 +314,21 @@ def test_reading_what_is_drawn_into_raises(device):
         device.fullscreen(shader, target, a_tx=target.colors[0])
 
 
+def test_freed_target_raises(device):
+    for free_target in (True, False):
+        target = canvas(device)
+        device.free(target if free_target else target.colors[0])
+        with pytest.raises(ValueError, match="fill.*freed"):
+            device.fullscreen(FILL, target, pc_color=(0, 0, 0, 0))
+        with pytest.raises(ValueError, match="freed"):
+            device.clear(target)
+
+
+def test_empty_viewport_raises(device):
+    with pytest.raises(ValueError, match="fill.*viewport"):
+        device.fullscreen(FILL, canvas(device), viewport=(0, 0, 0, 4), pc_color=(0, 0, 0, 0))
+
+
 def test_wrong_target_raises(device):
     a, b, depth = device.texture((2, 2), "R8"), device.texture((3, 2), "R8"), device.texture((2, 2), "DEPTH32F")
     for colors, of_depth in (([a, b], None), ([], None), ([depth], None), ([a], a), ([a] * 7, None)):
