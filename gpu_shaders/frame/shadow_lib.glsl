@@ -18,8 +18,8 @@ struct Receiver {
   float closeness;
 };
 
-/* What a texel says of the receiver: it lies before it, it is (about) the receiver's own surface, or it lies
- * behind, so that its centre misses the receiver's surface: beyond a silhouette. */
+/* What a texel says of the receiver: it lies before it; it is (about) the receiver's own surface; or its centre misses
+ * that surface, beyond a silhouette or on the other wall of a concave corner, and tells nothing. */
 const int SHADOW_BLOCKED = 1;
 const int SHADOW_LIT = 0;
 const int SHADOW_MISSED = -1;
@@ -43,8 +43,10 @@ ShadowTap shadow_tap(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Recei
   vec2 slope = texelFetch(slope_tx, texel, 0).rg;
   bool before_receiver = closeness + dot(slope, receiver.uv - center) > receiver.closeness + tolerance;
   float plane = map_plane_closeness(face, receiver.p, receiver.n, center);
-  int state = before_receiver && closeness > plane + tolerance ? SHADOW_BLOCKED : SHADOW_LIT;
-  return ShadowTap(closeness < plane - 4.0 * tolerance ? SHADOW_MISSED : state, closeness);
+  if (closeness > plane + tolerance) {
+    return ShadowTap(before_receiver ? SHADOW_BLOCKED : SHADOW_MISSED, closeness);
+  }
+  return ShadowTap(closeness < plane - 4.0 * tolerance ? SHADOW_MISSED : SHADOW_LIT, closeness);
 }
 
 Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
@@ -57,9 +59,9 @@ Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
   return receiver;
 }
 
-/* Visibility from one map position: one texel's width of softness, from noise over the samples. A texel beyond the
- * receiver's own silhouette tells nothing (a wall's top edge would be lit from beyond the ceiling that rests on it):
- * the texel on the other side answers for it. */
+/* Visibility from one map position: one texel's width of softness, from noise over the samples. Where a
+ * texel tells nothing (a wall's top edge would be lit from beyond the ceiling that rests on it), the texel on the other
+ * side answers for it. */
 float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
