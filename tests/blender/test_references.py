@@ -1,0 +1,69 @@
+"""Final renders against path-traced references: the figures that the documentation states, printed and held."""
+
+from pathlib import Path
+
+import bpy
+import pytest
+
+import rebound
+from rebound.tests.support.engine_build import render
+from rebound.tests.support.scoring import diffuse, energy, read_passes, relative_squared_error
+
+
+@pytest.fixture
+def render_shared(clean_scene, shared_dir, tmp_path):
+    """Render a shared scene with Rebound; gives its passes and those of its reference."""
+    rebound.register()
+
+    def run(name: str, reference: str, **settings):
+        bpy.ops.wm.open_mainfile(filepath=str(shared_dir / "scenes" / "basic" / f"{name}.blend"))
+        scene = bpy.context.scene
+        scene.render.engine = "REBOUND"
+        scene.render.use_compositing = scene.render.use_sequencer = False
+        for key, value in settings.items():
+            setattr(scene.rebound, key, value)
+        layer = scene.view_layers[0]
+        layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = layer.use_pass_diffuse_color = True
+        render(scene, tmp_path / f"{name}.exr")
+        truth = read_passes(Path(shared_dir) / "references" / f"{name}.{reference}.exr")
+        return truth, read_passes(tmp_path / f"{name}.exr")
+
+    yield run
+    rebound.unregister()
+
+
+def show(what: str, truth, test) -> tuple[float, float]:
+    """Print and return energy and relative squared error."""
+    figures = energy(truth, test), relative_squared_error(truth, test)
+    print(f"\n{what}: energy {figures[0]:.4f}, relmse {figures[1]:.4f}")
+    return figures
+
+
+def test_cornell_spot_direct_light_matches_the_path_tracer(render_shared):
+    truth, test = render_shared("cornell_spot", "one_bounce", samples=16, method="NONE")
+    level, error = show("cornell_spot, direct", diffuse(truth, "Direct"), diffuse(test, "Direct"))
+    assert 0.98 <= level <= 1.02
+    assert error <= 0.01
+
+
+def test_cornell_spot_all_texels_differ_by_visibility_only(render_shared):
+    """Path-traced bounce is occluded, ours is not yet: known to be 14 % too bright, relmse 0.158, from another renderer."""
+    truth, test = render_shared(
+        "cornell_spot",
+        "one_bounce",
+        samples=2,  # no noise to average: two only smooth the edges
+        rsm_estimator="ALL_TEXELS",
+        rsm_resolution=128,
+        rsm_interpolation="4",
+    )
+    level, error = show("cornell_spot, all texels", diffuse(truth, "Indirect"), diffuse(test, "Indirect"))
+    assert 1.10 <= level <= 1.18
+    assert error <= 0.17
+
+
+@pytest.mark.parametrize("name", ["sunlit_room", "divider", pytest.param("many_lights", marks=pytest.mark.slow)])
+def test_direct_light_of_other_scenes_matches_the_path_tracer(render_shared, name):
+    truth, test = render_shared(name, "one_bounce", samples=8, method="NONE")
+    level, error = show(f"{name}, direct", diffuse(truth, "Direct"), diffuse(test, "Direct"))
+    assert 0.98 <= level <= 1.02
+    assert error <= 0.01
