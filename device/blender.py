@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import bpy
-import gpu
+import gpu as _gpu
 import numpy as np
 
 from . import binding, blender_convert
@@ -21,6 +21,9 @@ from .interface import Device, DeviceError, DrawState, Program, Target, Texture,
 from .shader import Shader, ShaderError, Source
 
 _logger = logging.getLogger(__name__)
+
+# Untyped: the stubs spell out one version's literals, and ours are checked in Shader, Texture and DrawState.
+gpu: Any = _gpu
 
 _FORMATS = {"DEPTH32F": "DEPTH_COMPONENT32F"}
 _IS_4_5 = bpy.app.version < (5, 0, 0)

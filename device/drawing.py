@@ -108,6 +108,8 @@ class Drawing:
                 raise ValueError(
                     f"Shader {program.shader.name}: corners {first}..{first + count} of {vertices.count} do not exist"
                 )
+        if count % 3:
+            raise ValueError(f"Shader {program.shader.name}: {count} corners are not whole triangles")
         if count and instances:
             self._device._draw(program, vertices, first, count, instances)
 

@@ -30,11 +30,12 @@ class HeadlessDevice(Device):
     """A GPU without Blender. Raises DeviceError where no OpenGL 4.3 context can be made."""
 
     def __init__(self):
-        options = {"backend": "egl"} if sys.platform == "linux" else {}
+        options: Any = {"backend": "egl"} if sys.platform == "linux" else {}
         try:
-            self._ctx = ctx = moderngl.create_context(standalone=True, require=430, **options)
+            ctx: Any = moderngl.create_context(standalone=True, require=430, **options)
         except Exception as error:  # moderngl raises bare Exceptions
             raise DeviceError(f"No OpenGL 4.3 context: {error}") from error
+        self._ctx = ctx
         ctx.gc_mode = "auto"  # what is dropped is freed, as in Blender
         renderer = ctx.info["GL_RENDERER"]
         self.name = f"OpenGL {renderer} (standalone)"

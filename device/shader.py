@@ -112,10 +112,14 @@ class Shader:
     depth_write: bool = False
     #: Generated GLSL files, path to text, that stand in front of gpu_shaders/ (material code; tests).
     files: Mapping[str, str] = _frozen()
+    _key: tuple = field(init=False, repr=False)
+    _hash: int = field(init=False, repr=False)
 
     def __post_init__(self):
         key = []
         for f in fields(self):
+            if not f.init:
+                continue
             value = getattr(self, f.name)
             if isinstance(value, Mapping):
                 value = MappingProxyType(dict(value))

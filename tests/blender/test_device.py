@@ -12,6 +12,7 @@ from rebound.tests.support.device_contract import *  # noqa: F403
 from rebound.tests.support.device_contract import fragment, show
 from rebound.tests.support.device_contract_draw import *  # noqa: F403
 from rebound.tests.support.device_contract_draw import canvas
+from rebound.tests.support.device_contract_errors import *  # noqa: F403
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import pytest
 
 from rebound.tests.support.device_contract import *  # noqa: F403
 from rebound.tests.support.device_contract_draw import *  # noqa: F403
+from rebound.tests.support.device_contract_errors import *  # noqa: F403
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every device must do: data that arrives, and errors that name. Run by tests/headless and by tests/blender.
+"""What every device must do: data that arrives. Run by tests/headless and by tests/blender.
 
 Expected pictures are closed forms in numpy; a test gets its device from the fixture ``device``.
 """
@@ -7,7 +7,7 @@ Expected pictures are closed forms in numpy; a test gets its device from the fix
 import numpy as np
 import pytest
 
-from rebound.device import Image, Shader, ShaderError, Struct
+from rebound.device import Image, Shader, Struct
 
 LIGHT = Struct(
     "Light", position="vec3", kind="int", power="vec3", radius="float", uv="vec2", index="int", from_world="mat4"
@@ -332,72 +332,3 @@ def test_compute_has_shared_memory_and_atomics(device):
     texture = device.texture((1, 1), "R32UI", np.array([[5]], np.uint32))
     device.dispatch(shader, (3, 2), sum_img=texture)
     assert device.read(texture)[0, 0, 0] == 5 + 6 * (63 * 64 // 2)
-
-
-# --- errors ----------------------------------------------------------------------------------------------------------
-
-
-def test_wrong_names_raise_with_the_shaders_name(device):
-    shader = fragment("named", "void main() { out_color = vec4(pc_a); }", constants={"pc_a": "FLOAT", "pc_b": "FLOAT"})
-    for given, match in (
-        ({"pc_a": 1}, "named.*missing pc_b"),
-        ({"pc_a": 1, "pc_b": 1, "pc_c": 1}, "named.*unknown pc_c"),
-        ({"pc_a": 1, "pc_d": 1}, "named.*missing pc_b.*unknown pc_d"),
-        ({"pc_a": "x", "pc_b": 1}, "named.*pc_a"),
-    ):
-        with pytest.raises((TypeError, ValueError), match=match):
-            show(device, shader, **given)
-
-
-def test_texture_of_a_wrong_kind_raises(device):
-    shader = fragment("kinds", "void main() { out_color = texture(a_tx, uv); }", samplers={"a_tx": "FLOAT_2D"})
-    for texture in (device.texture((1, 1, 1), "RGBA32F"), device.texture((1, 1), "R32UI"), None, 7):
-        with pytest.raises(TypeError, match="kinds.*a_tx.*FLOAT_2D"):
-            show(device, shader, a_tx=texture)
-
-
-def test_image_of_a_wrong_format_raises(device):
-    shader = compute("image_kinds", "void main() { imageStore(a_img, ivec2(0), vec4(1)); }",
-                     images={"a_img": Image("RGBA16F", "FLOAT_2D", "WRITE")})  # fmt: skip
-    with pytest.raises(TypeError, match="image_kinds.*a_img.*RGBA16F"):
-        device.dispatch(shader, (1, 1, 1), a_img=device.texture((1, 1), "RGBA32F"))
-
-
-@pytest.mark.parametrize("stage", ["vertex", "fragment", "compute"])
-def test_compile_error_names_file_and_line(device, stage):
-    files = {
-        # The same faulty line stands, right, in another place: a line must not be found by its text.
-        "test/good_lib.glsl": "/* a comment\n over lines */\nfloat twice(float a)\n{\n  float wrong = a;\n"
-        "  return 2.0 * wrong;\n}\n",
-        "test/bad_lib.glsl": "// first\n\nfloat bad(float b)\n{\n  float wrong = a;\n  return wrong;\n}\n",
-        "test/main.glsl": '#include "test/good_lib.glsl"\n#include "test/bad_lib.glsl"\nvoid main()\n{\n  FOO;\n}\n',
-        "test/other.glsl": "void main() {}\n",
-    }
-    use = {
-        "vertex": "gl_Position = vec4(bad(twice(1.0)))",
-        "fragment": "out_color = vec4(bad(twice(1.0)))",
-        "compute": "bad(twice(1.0))",
-    }[stage]
-    files["test/main.glsl"] = files["test/main.glsl"].replace("FOO", use)
-    stages = {"vertex": "test/other.glsl", "fragment": "test/other.glsl", stage: "test/main.glsl"}
-    if stage == "compute":
-        shader = Shader("broken", compute="test/main.glsl", files=files)
-    else:
-        shader = Shader("broken", **stages, outputs={"out_color": "VEC4"}, files=files, structs=(LIGHT,))
-    with pytest.raises(ShaderError) as caught:
-        if stage == "compute":
-            device.dispatch(shader, (1, 1, 1))
-        else:
-            device.draw(shader, None, device.target([device.texture((1, 1), "RGBA32F")]))
-    assert caught.value.name == "broken"
-    assert caught.value.stage == stage
-    assert "test/bad_lib.glsl:5: " in str(caught.value), str(caught.value)
-    assert "good_lib" not in str(caught.value), str(caught.value)
-
-
-def test_shader_compiles_once_for_equal_declarations(device):
-    first, second = (fragment("equal", "void main() { out_color = vec4(1); }") for _ in range(2))
-    assert device._program(first) is device._program(second)
-    other = fragment("equal", "void main() { out_color = vec4(VALUE); }", defines=(("VALUE", "2.0"),))
-    assert show(device, other)[0, 0, 0] == 2.0
-    assert show(device, first)[0, 0, 0] == 1.0

@@ -151,21 +151,6 @@ def test_corners_without_attributes(device):
         assert set(np.unique(ids)) == expected | {0}
 
 
-def test_wrong_vertices_raise(device):
-    target, rest = canvas(device), {"pc_offset": (0, 0), "pc_matrix": np.eye(4)}
-    with pytest.raises(TypeError, match="triangles.*in_position"):
-        device.draw(TRIANGLES, None, target, **rest)
-    with pytest.raises(TypeError, match="triangles.*in_id"):
-        device.draw(
-            TRIANGLES, device.vertices({"in_position": np.zeros((3, 3)), "in_value": np.zeros(3)}), target, **rest
-        )
-    arrays = {"in_position": np.zeros((3, 3)), "in_value": np.zeros(3), "in_id": np.zeros(3)}
-    with pytest.raises(TypeError, match="triangles.*in_id is INT"):
-        device.draw(TRIANGLES, device.vertices(arrays), target, **rest)
-    with pytest.raises(ValueError, match="unequal"):
-        device.vertices({"in_position": np.zeros((3, 3)), "in_value": np.zeros(4)})
-
-
 # --- fixed function --------------------------------------------------------------------------------------------------
 
 
@@ -236,13 +221,6 @@ def test_counter_clockwise_is_the_front(device, cull, expected):
     np.testing.assert_array_equal(device.read(target.colors[0])[0, [0, 7], 0], expected)
 
 
-def test_depth_write_without_test_raises(device):
-    with pytest.raises(ValueError, match="ALWAYS"):
-        DrawState(depth_write=True)
-    with pytest.raises(TypeError, match="fill.*depth"):
-        device.fullscreen(FILL, canvas(device), state=WRITE_DEPTH, pc_color=(0, 0, 0, 0))
-
-
 # --- targets ---------------------------------------------------------------------------------------------------------
 
 
@@ -305,39 +283,6 @@ def test_fragment_stores_to_a_volume(device):
     expected = np.zeros((2, 4, 4, 1))
     expected[1] = 12
     np.testing.assert_array_equal(device.read(volume), expected)
-
-
-def test_reading_what_is_drawn_into_raises(device):
-    shader = fragment("loop", "void main() { out_color = texture(a_tx, uv); }", samplers={"a_tx": "FLOAT_2D"})
-    target = canvas(device)
-    with pytest.raises(TypeError, match="loop.*a_tx.*target"):
-        device.fullscreen(shader, target, a_tx=target.colors[0])
-
-
-def test_freed_target_raises(device):
-    for free_target in (True, False):
-        target = canvas(device)
-        device.free(target if free_target else target.colors[0])
-        with pytest.raises(ValueError, match="fill.*freed"):
-            device.fullscreen(FILL, target, pc_color=(0, 0, 0, 0))
-        with pytest.raises(ValueError, match="freed"):
-            device.clear(target)
-
-
-def test_empty_viewport_raises(device):
-    with pytest.raises(ValueError, match="fill.*viewport"):
-        device.fullscreen(FILL, canvas(device), viewport=(0, 0, 0, 4), pc_color=(0, 0, 0, 0))
-
-
-def test_wrong_target_raises(device):
-    a, b, depth = device.texture((2, 2), "R8"), device.texture((3, 2), "R8"), device.texture((2, 2), "DEPTH32F")
-    for colors, of_depth in (([a, b], None), ([], None), ([depth], None), ([a], a), ([a] * 7, None)):
-        with pytest.raises(ValueError, match="target"):
-            device.target(colors, of_depth)
-    shader = fragment("two", "void main() { out_a = vec4(1); out_b = 1u; }", outputs={"out_a": "VEC4", "out_b": "UINT"})
-    for colors in ([a], [a, device.texture((2, 2), "R8")]):
-        with pytest.raises(TypeError, match="Shader two"):
-            device.fullscreen(shader, device.target(colors))
 
 
 # --- drawing() -------------------------------------------------------------------------------------------------------
