@@ -7,7 +7,7 @@ import pytest
 from rebound.device import DrawState, Image, Shader, ShaderError
 
 from .device_contract import LIGHT, compute, fragment, show
-from .device_contract_draw import FILL, TRIANGLES, WRITE_DEPTH, canvas
+from .device_contract_draw import FILL, TRIANGLES, WRITE_DEPTH, canvas, quad, quads
 
 
 def test_wrong_names_raise_with_the_shaders_name(device):
