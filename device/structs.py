@@ -5,7 +5,8 @@ A ``Struct`` is packed in declaration order into whole vec4 texels, by the rules
 specification, section 7.6.2.2): a vec2 starts on 8 bytes, a vec3, vec4 or mat4 on 16, and a float or int may follow a
 vec3 in the same texel. So one layout serves both ways to the GPU:
 
-- a table: an RGBA32F texture, one row an element, read by the generated ``<name>_fetch(table_tx, index)``;
+- a table: an RGBA32F texture, one row an element, read by the generated ``<name>_fetch(table_tx, index)``; after
+  ``MAX_TABLE_ROWS`` elements the next ones stand beside the first (``table_texels``);
 - a uniform block: the same bytes in a uniform buffer.
 
 They differ in one thing: a table holds an int as its *value* in a float (exact to 2**24), a uniform block as int bits.
@@ -21,7 +22,7 @@ import numpy as np
 from .names import is_name
 
 TEXEL_BYTES = 16
-# A table is a texture with one row an element; no GPU we support takes more rows.
+# Every GPU we support takes so many rows. A power of two: the shader divides by it.
 MAX_TABLE_ROWS = 16384
 MAX_EXACT_INT = 2**24
 
@@ -181,18 +182,29 @@ class Struct:
     def glsl_fetch(self) -> str:
         """The GLSL function ``Name name_fetch(sampler2D table_tx, int index)``, on one line. It needs the struct."""
         texels = "".join(
-            f" vec4 t{k} = texelFetch(table_tx, ivec2({k}, index), 0);"
+            f" vec4 t{k} = texelFetch(table_tx, ivec2(at.x + {k}, at.y), 0);"
             for k in sorted({t for f in self.fields for t in range(f.offset // 4, (f.offset + f.floats - 1) // 4 + 1)})
         )
         members = "".join(f" e.{f.name} = {_from_texels(f)};" for f in self.fields)
         return (
             f"{self.name} {self.snake_name}_fetch(sampler2D table_tx, int index) "
-            f"{{{texels} {self.name} e;{members} return e; }}"
+            f"{{ ivec2 at = ivec2(index / {MAX_TABLE_ROWS} * {self.texels}, index % {MAX_TABLE_ROWS});"
+            f"{texels} {self.name} e;{members} return e; }}"
         )
 
     def glsl(self) -> str:
         """The struct and its fetch function: what a shader that reads a table needs."""
         return f"{self.glsl_struct()}\n{self.glsl_fetch()}\n"
+
+
+def table_texels(packed: np.ndarray) -> np.ndarray:
+    """The texels of a table from what ``Struct.pack`` made, (n, texels, 4): at most MAX_TABLE_ROWS rows, at least one."""
+    count, texels = packed.shape[:2]
+    rows = min(max(count, 1), MAX_TABLE_ROWS)
+    columns = -(-max(count, 1) // rows)
+    padded = np.zeros((columns * rows, texels, 4), np.float32)
+    padded[:count] = packed
+    return np.ascontiguousarray(padded.reshape(columns, rows, texels, 4).swapaxes(0, 1)).reshape(rows, -1, 4)
 
 
 def _lay_out(struct: str, fields: Mapping[str, str]) -> list[Field]:

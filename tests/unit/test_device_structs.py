@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from rebound.device import Struct
+from rebound.device.structs import MAX_TABLE_ROWS, table_texels
 
 LIGHT = Struct("SpotLight", position="vec3", kind="int", uv="vec2", angle="float", from_world="mat4", last="float")
 MATRIX = np.arange(16.0).reshape(4, 4)
@@ -126,3 +127,13 @@ def test_equal_structs_are_equal():
     assert Struct("A", a="float", b="int") == Struct("A", a="float", b="int")
     assert Struct("A", a="float", b="int") != Struct("A", b="int", a="float")
     assert len({Struct("A", a="float"), Struct("A", a="float")}) == 1
+
+
+def test_long_table_continues_beside_its_first_rows():
+    count = MAX_TABLE_ROWS + 3
+    packed = np.arange(count * 2 * 4, dtype=np.float32).reshape(count, 2, 4)
+    texels = table_texels(packed)
+    assert texels.shape == (MAX_TABLE_ROWS, 4, 4)
+    np.testing.assert_array_equal(texels[2, 2:], packed[MAX_TABLE_ROWS + 2])
+    np.testing.assert_array_equal(texels[5, :2], packed[5])
+    assert not texels[3:, 2:].any()
