@@ -30,7 +30,7 @@ def missing_gpu() -> str:
         return "No usable GPU: libEGL.so.1 is missing (on Debian: apt-get install libegl1 libgl1-mesa-dri)"
     if any(_makes_context(egl, display) for display in _displays(egl)):
         return ""
-    return "No usable GPU: no OpenGL 4.3 here (software OpenGL will do; on Debian: apt-get install libegl1 libgl1-mesa-dri)"
+    return "No usable GPU: no OpenGL 4.3 (software OpenGL will do; on Debian: apt-get install libegl1 libgl1-mesa-dri)"
 
 
 def _is_started() -> bool:
