@@ -20,7 +20,7 @@ from .gpu_shaders.frame.inputs import FrameInputs, GBuffer
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
 from .gpu_shaders.rsm.maps import ReflectiveShadowMaps
-from .gpu_shaders.technique import Technique, Value
+from .gpu_shaders.technique import Technique
 from .passes import PASSES, RenderPass
 from .scene.data import View, Visibility
 from .settings import SETTINGS, Settings
@@ -81,8 +81,8 @@ class Frame:
 class RsmBuffers:
     """One face of one light's reflective shadow map, read back.
 
-    ``layers``: depth (h, w, 1), metres along the face's axis, 0 where the light sees nothing; position (h, w, 3), world;
-    normal (h, w, 3); flux (h, w, 3), watts. float32, row 0 at the bottom.
+    ``layers``, float32 with row 0 at the bottom: depth (h, w, 1), metres along the face's axis, 0 where the light sees
+    nothing; position, world; normal, unit; flux, watts, all (h, w, 3).
     """
 
     light: str
@@ -104,7 +104,9 @@ class Renderer:
         size = (view.width, view.height)
         largest = self.device.max_texture_size
         if max(size) > largest or min(size) < 1:
-            raise RenderError(f"A picture of {size[0]} x {size[1]} pixels is not possible: this GPU takes 1 to {largest} a side")
+            raise RenderError(
+                f"A picture of {size[0]} x {size[1]} pixels is not possible: this GPU takes 1 to {largest} a side"
+            )
         return _new_frame(self.device, *size)
 
     def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
@@ -132,9 +134,7 @@ class Renderer:
     def texture(self, frame: Frame, key: str = "combined") -> Texture:
         """RGBA32F mean of a summed pass so far, for the screen; valid until the next call."""
         weight = 1.0 / max(frame.samples, 1)
-        self.device.fullscreen(
-            RESOLVE, frame.resolved_target, sum_tx=frame.sums[f"out_{key}"], pc_weight=weight
-        )
+        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums[f"out_{key}"], pc_weight=weight)
         return frame.resolved
 
     def read(self, frame: Frame, key: str) -> np.ndarray:
@@ -188,13 +188,9 @@ class Renderer:
         for name in [name for name in self._techniques if name != wanted]:
             self._techniques.pop(name).free()
         for kind in TECHNIQUES:
-            if kind.id == wanted:
-                return self._techniques.setdefault(wanted, None) or self._make(kind)
-        return None
-
-    def _make(self, kind: type[Technique]) -> Technique:
-        technique = self._techniques[kind.id] = kind(self.device)
-        return technique
+            if kind.id == wanted and wanted not in self._techniques:
+                self._techniques[wanted] = kind(self.device)
+        return self._techniques.get(wanted)
 
     def _draw_gbuffer(self, frame: Frame, inputs: FrameInputs) -> None:
         view = inputs.view

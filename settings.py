@@ -1,4 +1,4 @@
-"""The engine's settings as plain values: what the renderer reads, and what ui.properties makes Blender properties of."""
+"""The engine's settings as plain values: the renderer reads them, ui.properties makes Blender properties of them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ SETTINGS = (
         "samples",
         "INT",
         "Samples",
-        "Pictures that are averaged, each with other places inside the pixels. More makes edges, soft shadows and bounce "
-        "smoother, at the cost of time",
+        "Pictures that are averaged, each with other places inside the pixels. More makes edges, soft shadows and "
+        "bounce smoother, at the cost of time",
         64,
         viewport_default=32,
         minimum=1,
@@ -36,8 +36,8 @@ SETTINGS = (
         "shadow_resolution",
         "INT",
         "Shadow Resolution",
-        "Texels along a side of each light's shadow map. Higher makes shadow edges sharper, at the cost of memory and of time "
-        "when lights or objects move",
+        "Texels along a side of each light's shadow map. Higher makes shadow edges sharper, at the cost of memory and "
+        "of time when lights or objects move",
         2048,
         viewport_default=1024,
         minimum=64,
@@ -52,10 +52,18 @@ SETTINGS = (
         "SAMPLED",
         viewport_default="FILTERED",
         items=(
-            Item("SAMPLED", "Sampled", "A shadow map from another point of the light in every sample: exact after enough "
-                 "samples, at the cost of drawing the scene from the light every time"),
-            Item("FILTERED", "Filtered", "One shadow map, blurred by the light's size (PCSS): soft from the first sample, "
-                 "approximate where shadows of several objects meet"),
+            Item(
+                "SAMPLED",
+                "Sampled",
+                "A shadow map from another point of the light in every sample: exact after enough "
+                "samples, at the cost of drawing the scene from the light every time",
+            ),
+            Item(
+                "FILTERED",
+                "Filtered",
+                "One shadow map, blurred by the light's size (PCSS): soft from the first sample, "
+                "approximate where shadows of several objects meet",
+            ),
         ),
     ),
     Setting(

@@ -198,7 +198,7 @@ class Struct:
 
 
 def table_texels(packed: np.ndarray) -> np.ndarray:
-    """The texels of a table from what ``Struct.pack`` made, (n, texels, 4): at most MAX_TABLE_ROWS rows, at least one."""
+    """The texels of a table from what ``Struct.pack`` made, (n, texels, 4): one to MAX_TABLE_ROWS rows."""
     count, texels = packed.shape[:2]
     rows = min(max(count, 1), MAX_TABLE_ROWS)
     columns = -(-max(count, 1) // rows)

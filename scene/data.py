@@ -126,7 +126,7 @@ class Light:
     power: tuple[float, float, float]
     world_from_light: Array  # (4, 4) float64, with the object's scale
     radius: float = 0.0  # point, spot: metres
-    soft_falloff: bool = True  # point, spot: Blender's light.use_soft_falloff, the emitter is a disc facing the receiver; else a sphere
+    soft_falloff: bool = True  # point, spot: the emitter is a disc that turns to the receiver; else a sphere
     angle: float = 0.0  # sun: angular diameter, radians
     spot_angle: float = 0.0  # spot: full cone angle, radians
     spot_blend: float = 0.0  # spot: 0..1

@@ -1,4 +1,4 @@
-"""Render the pictures of README and docs into docs/images: `.venv/bin/python tools/render_pictures.py SCENES [NAME ...]`.
+"""Render the pictures of README and docs: `.venv/bin/python tools/render_pictures.py SCENES [NAME ...]`.
 
 SCENES is the folder of the shared test scenes; the example scene of the repository needs none of it. Pictures of other
 people's scenes are credited where they are shown.

@@ -5,8 +5,8 @@ C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
 1. Draw the scene from every light: position, normal and reflected flux (``maps``).
 2. Gather irradiance at every pixel from the texels, each a small Lambertian lamp: from all of them, from
    the paper's disc around the pixel's own place in the map as published, or from that disc with exact weights.
-3. Screen-space interpolation (section 4.2 of the paper): gather on a coarse grid of pixels, reuse where plane and normal
-   agree, gather in full where they do not.
+3. Screen-space interpolation (section 4.2 of the paper): gather on a coarse grid of pixels, reuse where plane and
+   normal agree, gather in full where they do not.
 
 Limits: no visibility between texel and pixel, so bounced light passes walls; diffuse reflectors only; one bounce;
 cost grows with every light.
@@ -15,18 +15,22 @@ cost grows with every light.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from ...device.interface import Device, Target, Texture
+from ...device.shader import Shader
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs
+from ..frame.maps import Atlas
 from ..technique import Item, Setting, Value
 from .maps import ReflectiveShadowMaps
 from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SHADERS
 
 # Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
 WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
+Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
 
@@ -38,19 +42,31 @@ SETTINGS = (
         "How bounced light is summed from the texels of the maps",
         "DISC_EXACT",
         items=(
-            Item("DISC_EXACT", "Disc, Exact Weight", "Random texels, more of them near the pixel's own place in the map, "
-                 "each weighted exactly: noise that averages out over samples, and no error in level"),
-            Item("DISC_PUBLISHED", "Disc, as Published", "The disc of the 2005 paper with its weights: fast and smooth, but it "
-                 "loses near light and all light from beyond the disc"),
-            Item("ALL_TEXELS", "All Texels", "Every texel of every map: no noise at all, at the cost of many times the time"),
+            Item(
+                "DISC_EXACT",
+                "Disc, Exact Weight",
+                "Random texels, more of them near the pixel's own place in the map, "
+                "each weighted exactly: noise that averages out over samples, and no error in level",
+            ),
+            Item(
+                "DISC_PUBLISHED",
+                "Disc, as Published",
+                "The disc of the 2005 paper with its weights: fast and smooth, but it "
+                "loses near light and all light from beyond the disc",
+            ),
+            Item(
+                "ALL_TEXELS",
+                "All Texels",
+                "Every texel of every map: no noise at all, at the cost of many times the time",
+            ),
         ),
     ),
     Setting(
         "resolution",
         "INT",
         "Map Resolution",
-        "Texels along a side of each light's map. Higher keeps small and touching surfaces apart, at the cost of memory and of "
-        "time where all texels are gathered; lower is faster and blurs bounce close to corners",
+        "Texels along a side of each light's map. Higher keeps small and touching surfaces apart, at the cost of "
+        "memory and of time where all texels are gathered; lower is faster and blurs bounce close to corners",
         256,
         viewport_default=128,
         minimum=16,
@@ -61,8 +77,8 @@ SETTINGS = (
         "gathers",
         "INT",
         "Gathers",
-        "Texels that each pixel gathers in one sample, shared among the lights, for the disc estimators. More is less noise "
-        "a sample, at the cost of time",
+        "Texels that each pixel gathers in one sample, shared among the lights, for the disc estimators. More is less "
+        "noise a sample, at the cost of time",
         64,
         viewport_default=32,
         minimum=1,
@@ -73,9 +89,9 @@ SETTINGS = (
         "radius",
         "FLOAT",
         "Disc Radius",
-        "Radius of the disc of texels, in parts of the map's width. As published, light from beyond it is lost, so larger "
-        "is brighter and noisier; with exact weights it changes the noise only, and smaller is better where near surfaces "
-        "bounce most",
+        "Radius of the disc of texels, in parts of the map's width. As published, light from beyond it is lost, so "
+        "larger is brighter and noisier; with exact weights it changes the noise only, and smaller is better where "
+        "near surfaces bounce most",
         0.3,
         minimum=0.01,
         maximum=1.5,
@@ -162,7 +178,7 @@ class Rsm:
     ) -> Iterator[float]:
         """Add the chosen estimator's sum to ``target``, in passes of bounded work."""
         positions, normals, fluxes = self.maps.colors
-        shared = {
+        shared: dict[str, Any] = {
             "position_tx": inputs.gbuffer.position,
             "normal_tx": inputs.gbuffer.normal,
             "reused_tx": reused,
@@ -172,23 +188,24 @@ class Rsm:
             "pc_stride": stride,
             "pc_offset": offset,
         }
+        assert self.maps.atlas is not None
         passes = self._all_passes if settings["estimator"] == "ALL_TEXELS" else self._disc_passes
         work = WORK_SOFTWARE if self.device.is_software else WORK_HARDWARE
         pixels = target.size[0] * target.size[1]
-        for shader, values, done in passes(inputs, settings, max(work // max(pixels, 1), 1)):
+        for shader, values, done in passes(self.maps.atlas, inputs, settings, max(work // max(pixels, 1), 1)):
             self.device.fullscreen(shader, target, state=ADD, **shared, **values)
             yield done
 
-    def _all_passes(self, inputs, settings, texels):
+    def _all_passes(self, atlas: Atlas, inputs: FrameInputs, settings: Mapping[str, Value], texels: int) -> Passes:
         """(shader, its constants, progress) for pieces of about ``texels`` texels."""
-        atlas = self.maps.atlas
         width, height = atlas.size
         rows = max(texels // width, 1)
         for first in range(0, height, rows):
             last = min(first + rows, height)
             yield GATHER_ALL, {"pc_first_row": first, "pc_last_row": last, "pc_row_length": width}, last / height
 
-    def _disc_passes(self, inputs, settings, texels):
+    def _disc_passes(self, atlas: Atlas, inputs: FrameInputs, settings: Mapping[str, Value], texels: int) -> Passes:
+        """The same for about ``texels`` gathers a pixel."""
         published = settings["estimator"] == "DISC_PUBLISHED"
         lights = len(inputs.gpu_scene.scene.lights)
         gathers = max(int(settings["gathers"]) // lights, LEAST_GATHERS_A_LIGHT)
@@ -202,8 +219,9 @@ class Rsm:
                 "pc_last_light": last,
                 "pc_samples": gathers,
                 "pc_radius": float(settings["radius"]),
-                "pc_tile": float(self.maps.atlas.tile),
+                "pc_tile": float(atlas.tile),
                 "pc_seed": inputs.noise_seed(1),
+                "pc_sample": inputs.sample,
             }
             yield GATHER_PUBLISHED if published else GATHER_EXACT, values, last / lights
 

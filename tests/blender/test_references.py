@@ -35,7 +35,7 @@ def render_shared(clean_scene, shared_dir, tmp_path):
 def show(what: str, truth, test) -> tuple[float, float]:
     """Print and return energy and relative squared error."""
     figures = energy(truth, test), relative_squared_error(truth, test)
-    print(f"\n{what}: energy {figures[0]:.4f}, relmse {figures[1]:.4f}")
+    print(f"\n{what}: energy {figures[0]:.4f}, relmse {figures[1]:.4f}")  # noqa: T201  pytest -s shows the figures
     return figures
 
 
@@ -47,7 +47,7 @@ def test_cornell_spot_direct_light_matches_the_path_tracer(render_shared):
 
 
 def test_cornell_spot_all_texels_differ_by_visibility_only(render_shared):
-    """Path-traced bounce is occluded, ours is not yet: known to be 14 % too bright, relmse 0.158, from another renderer."""
+    """Path-traced bounce is occluded, ours not yet: 14 % too bright, relmse 0.158, as another renderer found too."""
     truth, test = render_shared(
         "cornell_spot",
         "one_bounce",
