@@ -33,9 +33,7 @@ class DirectLight:
         self.maps = LightMaps(device, ["RG16F"])
         self.light_table: Texture | None = None
 
-    def draw(
-        self, inputs: FrameInputs, target: Target, *, filtered: bool, resolution: int
-    ) -> Iterator[float]:
+    def draw(self, inputs: FrameInputs, target: Target, *, filtered: bool, resolution: int) -> Iterator[float]:
         """Write this sample's direct irradiance / pi into ``target``; yields progress 0..1.
 
         ``filtered``: shadows of sized lights are filtered (PCSS) from one map kept as long as nothing moves; otherwise
@@ -102,6 +100,7 @@ class DirectLight:
             pc_first_light=first,
             pc_last_light=last,
             pc_seed=inputs.noise_seed(0),
+            pc_sample=inputs.sample,
         )
 
 

@@ -4,14 +4,20 @@
 
 /* Where this pixel's light comes from: the light's own sample of this frame, or, where shadows are filtered, a point of the
  * emitter of the pixel's own. */
-vec3 direct_source(Light light, vec2 noise)
+vec3 direct_source(Light light, vec3 P, vec2 noise)
 {
-  if (light.filtered == 0 || light.kind != LIGHT_AREA) {
+  bool spot = light.kind == LIGHT_SPOT && light.blur_radius > 0.0;
+  if (light.filtered == 0 || !(spot || light.kind == LIGHT_AREA)) {
     return light.source;
   }
   vec2 place = 2.0 * noise - 1.0;
-  if (light.round_shape != 0) {
+  if (spot || light.round_shape != 0) {
     place = sqrt(noise.x) * vec2(cos(2.0 * SAMPLING_PI * noise.y), sin(2.0 * SAMPLING_PI * noise.y));
+  }
+  if (spot) {
+    vec3 axis = normalize(light.position - P);
+    vec3 side = normalize(cross(axis, abs(axis.x) < 0.9 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)));
+    return light.position + light.blur_radius * (place.x * side + place.y * cross(axis, side));
   }
   return light.position + place.x * light.half_size.x * light.axis_x + place.y * light.half_size.y * light.axis_y;
 }
@@ -50,12 +56,16 @@ void main()
   vec3 sum = vec3(0.0);
   for (int i = pc_first_light; i < pc_last_light; i++) {
     Light light = light_fetch(light_tx, i);
-    vec2 noise = sampling_hash(pixel, pc_seed + 2 * i);
-    vec3 source = direct_source(light, noise);
-    vec3 direction = light.kind == LIGHT_SUN ? source : source - position.xyz;
+    vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2 * i));
+    vec3 source = direct_source(light, position.xyz, noise);
+    bool whole = light.filtered != 0 && light.kind != LIGHT_AREA;
+    vec3 direction = light.kind == LIGHT_SUN ? source : (whole ? light.position : source) - position.xyz;
     vec3 irradiance = light_unshadowed(light, position.xyz, N, source);
-    if (dot(geometric, direction) > 0.0 && any(greaterThan(irradiance, vec3(0.0)))) {
-      sum += irradiance * direct_visibility(light, position.xyz, geometric, sampling_hash(pixel, pc_seed + 2 * i + 1));
+    /* The upper part of a light whose centre is below the horizon still shines. */
+    float below = whole ? light.blur_radius : 0.0;
+    if (dot(geometric, direction) > -below && any(greaterThan(irradiance, vec3(0.0)))) {
+      noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2 * i + 1));
+      sum += irradiance * direct_visibility(light, position.xyz, geometric, noise);
     }
   }
   out_direct = vec4(sum, 0.0);

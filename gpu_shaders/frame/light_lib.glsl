@@ -1,29 +1,31 @@
 /* Lights in Cycles' units (docs/lights.md). `intensity` is P / (4 pi) W/sr of a point or spot, P / pi of an area light
  * (W/sr along its axis), the irradiance E of a sun. */
 
+const float LIGHT_PI = 3.14159265358979;
+
 const int LIGHT_POINT = 0;
 const int LIGHT_SPOT = 1;
 const int LIGHT_SUN = 2;
 const int LIGHT_AREA = 3;
 
-/* The cone of a spot: smoothstep between its edge and the blend's inner cone, over the cosine. `d` is the unit
- * direction from the light. */
+/* The cone of a spot: smoothstep between its edge and the blend's inner cone, over the cosine in the light's object space.
+ * `d` is the unit direction from the light. */
 float light_spot_cone(Light light, vec3 d)
 {
-  vec3 local = vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z));
-  float cosine = -normalize(local).z;
+  vec2 side = vec2(dot(d, light.axis_x), dot(d, light.axis_y)) * light.spot_stretch;
+  float cosine = -normalize(vec3(side, dot(d, light.axis_z))).z;
   float t = clamp((cosine - light.spot_cosine) * light.spot_smooth, 0.0, 1.0);
   return cosine <= light.spot_cosine ? 0.0 : t * t * (3.0 - 2.0 * t);
 }
 
-/* The spread of an area light: how much of its emitter's radiance leaves at `cosine` to its axis, with Cycles'
+/* The spread of an area light: how much of its emitter's radiance leaves toward the unit direction `d`, with Cycles'
  * normalisation. spread_tangent < 0 stands for no limit. */
-float light_area_spread(Light light, float cosine)
+float light_area_spread(Light light, vec3 d)
 {
   if (light.spread_tangent < 0.0) {
     return 1.0;
   }
-  float tangent = sqrt(max(1.0 - cosine * cosine, 0.0)) / max(cosine, 1e-6);
+  float tangent = length(cross(d, light.axis_z)) / max(-dot(d, light.axis_z), 1e-6);
   return max((light.spread_tangent - tangent) * light.spread_normalize, 0.0);
 }
 
@@ -34,18 +36,71 @@ vec3 light_intensity(Light light, vec3 d)
     return light.intensity * light_spot_cone(light, d);
   }
   if (light.kind == LIGHT_AREA) {
-    float cosine = max(-dot(d, light.axis_z), 0.0);
-    return light.intensity * cosine * light_area_spread(light, cosine);
+    return light.intensity * max(-dot(d, light.axis_z), 0.0) * light_area_spread(light, d);
   }
   return light.intensity;
 }
 
+/* The mean of max(N . w, 0) / (a . w) over the projected solid angle of a round emitter about the direction a, N . a = `cosine`,
+ * that fills the cone of squared sine `sine_squared` evenly: the cosine itself but where the horizon cuts the emitter
+ * (Lagarde & de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014, listing 7). */
+float light_round_cosine(float cosine, float sine_squared)
+{
+  if (cosine * cosine >= sine_squared) {
+    return max(cosine, 0.0);
+  }
+  float sine = sqrt(max(1.0 - cosine * cosine, 1e-12));
+  float x = sqrt(max(1.0 / min(sine_squared, 1.0) - 1.0, 1e-12));
+  float y = clamp(-x * cosine / sine, -1.0, 1.0);
+  float w = sine * sqrt(1.0 - y * y);
+  return max((cosine * acos(y) - x * w) / LIGHT_PI + atan(w / x) / (LIGHT_PI * sine_squared), 0.0);
+}
+
+/* Irradiance / pi from a point or spot light, `source` one point of its emitter (lights.emitter_sample). */
+vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
+{
+  vec3 center = light.position - P;
+  float squared = dot(center, center);
+  float radius_squared = light.blur_radius * light.blur_radius;
+  bool disc = light.soft_radius_squared > 0.0;
+  if (squared <= (disc ? 0.0 : radius_squared)) {
+    return disc || radius_squared == 0.0 ? vec3(0.0) : light.intensity / (radius_squared * LIGHT_PI);
+  }
+  float inverse = inversesqrt(squared);
+  vec3 axis = center * inverse;
+  /* Seen from P the emitter is an even disc around its centre: the source's place in it. */
+  vec3 place = source - light.position;
+  place -= axis * dot(axis, place);
+  vec3 w =
+      disc ? normalize(center + place) : axis * sqrt(max(1.0 - dot(place, place) / squared, 0.0)) + place * inverse;
+  vec3 intensity = light_intensity(light, -w) / LIGHT_PI;
+  if (light.filtered != 0 && light.kind == LIGHT_POINT) {
+    float seen = squared + light.soft_radius_squared;
+    return intensity * light_round_cosine(dot(N, axis), radius_squared / seen) / seen;
+  }
+  float cosine = max(dot(N, w), 0.0);
+  if (disc) {
+    float distance_squared = squared + dot(place, place);
+    return intensity * cosine * dot(axis, w) / distance_squared;
+  }
+  return intensity * cosine / (max(dot(axis, w), 1e-2) * squared);
+}
+
 /* Irradiance / pi at P with normal N when the light's whole power leaves from `source` (for a sun: comes from the
- * direction `source`). `soft_area` is added to the squared distance: a disc emitter that turns to the receiver. */
+ * direction `source`). Where `filtered` is set, points and suns give the whole emitter's in closed form. */
 vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
 {
   if (light.kind == LIGHT_SUN) {
-    return light.intensity * max(dot(N, source), 0.0) / 3.14159265358979;
+    if (light.filtered != 0) {
+      float tangent_squared = light.blur_radius * light.blur_radius;
+      float sine_squared = tangent_squared / (1.0 + tangent_squared);
+      return light.intensity * light_round_cosine(dot(N, light.axis_z), sine_squared) / LIGHT_PI;
+    }
+    /* Sources are even over the cone; a surface that faces the sun gets its whole strength at any angle. */
+    return light.intensity * max(dot(N, source), 0.0) * 2.0 / (LIGHT_PI * (1.0 + light.spot_cosine));
+  }
+  if (light.kind != LIGHT_AREA) {
+    return light_round_unshadowed(light, P, N, source);
   }
   vec3 to_light = source - P;
   float squared = dot(to_light, to_light);
@@ -53,8 +108,5 @@ vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
     return vec3(0.0);
   }
   vec3 d = to_light * inversesqrt(squared);
-  float cosine = max(dot(N, d), 0.0);
-  vec3 center = light.kind == LIGHT_AREA ? to_light : light.position - P;
-  float distance_squared = dot(center, center) + light.soft_radius_squared;
-  return light_intensity(light, -d) * cosine / (distance_squared * 3.14159265358979);
+  return light_intensity(light, -d) * max(dot(N, d), 0.0) / (squared * LIGHT_PI);
 }

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...scene.data import AreaShape, Light, LightKind
-from .maps import light_axes
+from .maps import light_axes, spot_stretch
 
 KINDS = {LightKind.POINT: 0, LightKind.SPOT: 1, LightKind.SUN: 2, LightKind.AREA: 3}
 ROUND = (AreaShape.DISK, AreaShape.ELLIPSE)
@@ -39,23 +39,25 @@ def intensity(light: Light) -> np.ndarray:
 
 
 def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.ndarray:
-    """The point (sun: unit direction to the light) that sample ``index`` of the frame uses.
+    """The point (sun: unit direction to the light, even over its cone) that sample ``index`` of the frame uses.
 
-    A point or spot light of radius R is a disc that turns to every receiver. One point must serve all receivers, so it is
-    drawn from the isotropic density whose projection onto any plane is the uniform disc: its inverse
+    A point or spot light of radius R is a disc that turns to every receiver. One point must serve all receivers, so it
+    is drawn from the isotropic density whose projection onto any plane is the uniform disc: its inverse
     Abel transform, proportional to 1 / sqrt(R² - r²).
     """
-    u = (count_offset + _R3 * index) % 1.0
+    flat = light.kind in (LightKind.SUN, LightKind.AREA)
+    u = _net_point(index, count_offset) if flat else (count_offset + _R3 * index) % 1.0
     center = np.asarray(light.world_from_light, np.float64)[:3, 3]
     axes = light_axes(light)
     if light.kind is LightKind.SUN:
-        radius, angle = math.tan(0.5 * min(light.angle, 3.0)) * math.sqrt(u[0]), 2 * math.pi * u[1]
-        direction = axes @ np.array([radius * math.cos(angle), radius * math.sin(angle), 1.0])
+        cosine, angle = 1 - u[0] * (1 - math.cos(0.5 * light.angle)), 2 * math.pi * u[1]
+        sine = math.sqrt(max(1 - cosine * cosine, 0))
+        direction = axes @ np.array([sine * math.cos(angle), sine * math.sin(angle), cosine])
         return direction / np.linalg.norm(direction)
     if light.kind is LightKind.AREA:
-        x, y = 2 * u[:2] - 1
+        x, y = 2 * u[0] - 1, 2 * u[1] - 1
         if light.area_shape in ROUND:
-            x, y = math.sqrt(u[0]) * math.cos(2 * math.pi * u[1]), math.sqrt(u[0]) * math.sin(2 * math.pi * u[1])
+            x, y = _concentric(x, y)
         half = half_size(light)
         return center + axes[:, 0] * x * half[0] + axes[:, 1] * y * half[1]
     if light.radius <= 0:
@@ -64,6 +66,29 @@ def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.nda
     side = math.sqrt(max(1 - z * z, 0))
     direction = np.array([side * math.cos(angle), side * math.sin(angle), z])
     return center + light.radius * math.sin(_sine_squared_quantile(u[2])) * direction
+
+
+def _net_point(index: int, scramble: np.ndarray) -> tuple[float, float]:
+    """Point ``index`` of a (0, 2)-sequence, Sobol's first two dimensions, with digits flipped by ``scramble`` (0..1).
+
+    Every 2^k points in order lie one in each box of a grid of 2^k boxes, whatever the grid's shape.
+    """
+    x, y = (int(s * 2**32) for s in scramble[:2])
+    column_x = column_y = 1 << 31
+    while index:
+        if index & 1:
+            x, y = x ^ column_x, y ^ column_y
+        column_x, column_y, index = column_x >> 1, column_y ^ column_y >> 1, index >> 1
+    return x / 2**32, y / 2**32
+
+
+def _concentric(x: float, y: float) -> tuple[float, float]:
+    """The square [-1, 1]² onto the unit disc, areas kept and neighbours too (Shirley & Chiu 1997)."""
+    if abs(x) < abs(y):
+        angle = 0.5 * math.pi - 0.25 * math.pi * x / y
+        return y * math.cos(angle), y * math.sin(angle)
+    angle = 0.25 * math.pi * y / x if x else 0.0
+    return x * math.cos(angle), x * math.sin(angle)
 
 
 def _sine_squared_quantile(u: float) -> float:
@@ -83,7 +108,8 @@ def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int,
     axes = light_axes(light)
     center = np.asarray(light.world_from_light, np.float64)[:3, 3]
     half = half_size(light) if light.kind is LightKind.AREA else (0.0, 0.0)
-    spot_cosine = math.cos(0.5 * light.spot_angle)
+    spot_cosine = math.cos(0.5 * (light.angle if light.kind is LightKind.SUN else light.spot_angle))
+    is_disc = light.soft_falloff and light.kind in (LightKind.POINT, LightKind.SPOT)
     tangent, normalize = _spread(light)
     if filtered:
         source = axes[:, 2] if light.kind is LightKind.SUN else center
@@ -95,7 +121,7 @@ def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int,
         "axis_z": axes[:, 2],
         "spot_cosine": spot_cosine,
         "spot_smooth": 1.0 / max((1.0 - spot_cosine) * light.spot_blend, 1e-7),
-        "soft_radius_squared": light.radius**2 if light.soft_falloff and light.kind is not LightKind.AREA else 0.0,
+        "soft_radius_squared": light.radius**2 if is_disc else 0.0,
         "intensity": intensity(light),
         "face_count": face_count,
         "source": source,
@@ -107,6 +133,7 @@ def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int,
         "spread_normalize": normalize,
         "blur_radius": _blur_radius(light, half),
         "round_shape": int(light.area_shape in ROUND),
+        "spot_stretch": spot_stretch(light),
     }
 
 

@@ -1,8 +1,8 @@
 """The faces a light looks at the scene through, and their tiles in an atlas. Plain numpy, no GPU.
 
 A spot has one perspective face, a point light the six faces of a cube, an area light (and a spot too wide for one
-face) the half cube before it. A sun has one orthographic face fitted to the scene; where a few huge objects (a ground plane)
-would take nearly all of its texels, it has one fitted to the rest and a second for everything.
+face) the half cube before it. A sun has one orthographic face fitted to the scene; where a few huge objects (a ground
+plane) would take nearly all of its texels, it has one fitted to the rest and a second for everything.
 """
 
 from __future__ import annotations
@@ -88,6 +88,12 @@ def light_axes(light: Light) -> np.ndarray:
     return axes / np.where(lengths > 0, lengths, 1.0)
 
 
+def spot_stretch(light: Light) -> tuple[float, float]:
+    """The object's scale along Z over that along X and Y: a spot's cone is round in object space only."""
+    x, y, z = np.linalg.norm(np.asarray(light.world_from_light, np.float64)[:3, :3], axis=0)
+    return (float(z / x), float(z / y)) if min(x, y, z) > 0 else (1.0, 1.0)
+
+
 def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
     """The faces of one light for a scene of instances within ``boxes`` (n, 2, 3), n > 0.
 
@@ -103,15 +109,18 @@ def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = Non
     reach = float(np.abs(bounds).max(initial=0.0)) + float(np.abs(origin).max())
     epsilon = ROUNDING * max(1.0, reach / far)
     if light.kind is LightKind.SPOT and light.spot_angle <= WIDEST_SINGLE_FACE:
-        tangent = math.tan(0.5 * light.spot_angle) * CONE_MARGIN
-        return (_cube_face("-Z", "", axes, origin, 1.0 / max(tangent, 1e-4), far, epsilon),)
+        tangents = math.tan(0.5 * light.spot_angle) / np.array(spot_stretch(light))
+        if tangents.max() <= math.tan(0.5 * WIDEST_SINGLE_FACE):
+            scale = 1.0 / np.maximum(tangents * CONE_MARGIN, 1e-4)
+            return (_cube_face("-Z", "", axes, origin, scale, far, epsilon),)
     names = list(_CUBE) if light.kind is LightKind.POINT else list(_CUBE)[:5]
-    return tuple(_cube_face(name, name, axes, origin, 1.0, far, epsilon) for name in names)
+    return tuple(_cube_face(name, name, axes, origin, (1.0, 1.0), far, epsilon) for name in names)
 
 
 def _cube_face(side, name, axes, origin, scale, far, epsilon) -> Face:
     forward, up = (axes @ np.asarray(v, np.float64) for v in _CUBE[side])
-    return Face(name, _looking(origin, forward, up), (scale, scale), NEAR_OF_FAR * far, far, epsilon, True)
+    scale = (float(scale[0]), float(scale[1]))
+    return Face(name, _looking(origin, forward, up), scale, NEAR_OF_FAR * far, far, epsilon, True)
 
 
 def _looking(origin, forward, up) -> np.ndarray:

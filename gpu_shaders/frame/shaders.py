@@ -62,7 +62,7 @@ DIRECT = Shader(
         "shadow_slope_tx": "FLOAT_2D",
     },
     structs=(LIGHT, MAP_FACE),
-    constants={"pc_first_light": "INT", "pc_last_light": "INT", "pc_seed": "INT"},
+    constants={"pc_first_light": "INT", "pc_last_light": "INT", "pc_seed": "INT", "pc_sample": "INT"},
 )
 
 ACCUMULATE = Shader(

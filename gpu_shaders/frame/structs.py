@@ -17,11 +17,11 @@ LIGHT = Struct(
     position="vec3",  # the emitter's centre
     kind="int",  # LIGHT_* of light_lib.glsl
     axis_x="vec3",  # the light's own axes in the world, unit; it looks down -axis_z
-    spot_cosine="float",  # cosine of half the cone
+    spot_cosine="float",  # cosine of half the cone; sun: of half its angle
     axis_y="vec3",
     spot_smooth="float",  # 1 / (blend (1 - spot_cosine))
     axis_z="vec3",
-    soft_radius_squared="float",  # a disc emitter that turns to the receiver: its radius squared, else 0
+    soft_radius_squared="float",  # point, spot: a disc that turns to the receiver: its radius squared; a sphere: 0
     intensity="vec3",  # W/sr, sun: W/m²
     face_count="int",  # shadow map faces, 0: casts no shadow
     source="vec3",  # this frame's point on the emitter; sun: unit direction to it
@@ -33,6 +33,7 @@ LIGHT = Struct(
     spread_normalize="float",
     blur_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
     round_shape="int",  # area: 1 for disk and ellipse
+    spot_stretch="vec2",  # the object's scale along Z over that along X and Y: it stretches a spot's cone
 )
 
 MAP_FACE = Struct(

@@ -2,8 +2,8 @@
  * Hash: pcg3d of Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020. */
 
 const float SAMPLING_PI = 3.14159265358979;
-/* The R2 sequence (Roberts 2018): 1/g and 1/g^2 with g the plastic number. */
-const vec2 SAMPLING_R2 = vec2(0.754877666246693, 0.569840290998053);
+/* The R2 sequence (Roberts 2018): 1/g and 1/g^2 with g the plastic number, in parts of 2^32. */
+const uvec2 SAMPLING_R2 = uvec2(3242174889u, 2447445414u);
 
 uvec3 sampling_pcg3d(uvec3 v)
 {
@@ -25,10 +25,11 @@ vec2 sampling_hash(ivec2 pixel, int seed)
   return vec2(bits.xy >> 8u) * (1.0 / 16777216.0);
 }
 
-/* Point `index` of the R2 sequence, shifted by a random offset (Cranley-Patterson rotation). */
+/* Point `index` of the R2 sequence, shifted by a random offset in [0, 1) (Cranley-Patterson rotation). Integers keep it exact
+ * however far it runs. */
 vec2 sampling_r2(int index, vec2 offset)
 {
-  return fract(offset + SAMPLING_R2 * float(index));
+  return fract(offset + vec2((SAMPLING_R2 * uint(index)) >> 8u) * (1.0 / 16777216.0));
 }
 
 /* Point `index` of `count` of a Vogel spiral in the unit disc: equal areas, turned by `turn` in [0, 1). */

@@ -26,8 +26,8 @@ void main()
   }
   vec3 albedo = vec3(0.0);
   if (pc_reflects != 0) {
-    albedo = surface_evaluate(
-        material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv).albedo;
+    albedo = surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv)
+                 .albedo;
   }
   /* A sun's far map sends no light from where its near map does. */
   if (pc_served >= 0) {
@@ -37,6 +37,8 @@ void main()
     }
   }
   vec3 flux = light_intensity(light, -d) * measure * albedo;
+  /* A disc that turns to the receiver gives 1 / (d^2 + r^2) where a point gives 1 / d^2. */
+  flux *= distance_squared / (distance_squared + light.soft_radius_squared);
   float area = measure * distance_squared / max(dot(geometric, d), RSM_GRAZING);
 
   gl_FragDepth = clamp(pc_perspective != 0 ? 1.0 / (pc_far * gl_FragCoord.w) : gl_FragCoord.z, 0.0, 1.0);

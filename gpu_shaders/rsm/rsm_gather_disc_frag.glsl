@@ -45,7 +45,7 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
   for (int i = 0; i < pc_samples; i++) {
-    vec2 xi = sampling_r2(i, shift);
+    vec2 xi = sampling_r2(pc_sample * pc_samples + i, shift);
     sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
   }
   float texels = SAMPLING_PI * pc_radius * pc_radius * pc_tile * pc_tile;
@@ -59,7 +59,8 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
   float share = float(in_disc) / float(pc_samples);
   for (int i = 0; i < pc_samples; i++) {
     bool disc = i < in_disc;
-    vec2 xi = sampling_r2(disc ? i : i - in_disc, disc ? shift : fract(shift.yx + 0.5));
+    int index = disc ? pc_sample * in_disc + i : pc_sample * (pc_samples - in_disc) + i - in_disc;
+    vec2 xi = sampling_r2(index, disc ? shift : fract(shift.yx + 0.5));
     int face = g.face;
     vec2 uv;
     if (disc) {

@@ -61,6 +61,7 @@ def _gather_disc(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
             "pc_radius": "FLOAT",
             "pc_tile": "FLOAT",
             "pc_seed": "INT",
+            "pc_sample": "INT",
         },
         defines=defines,
     )
