@@ -164,6 +164,7 @@ class Renderer:
         """Counts for the statistics panel and the tests."""
         result: dict[str, float] = {
             "triangles": self._triangles,
+            "gpu_bytes": self.device.allocated_bytes,
             "shadow_maps": len(self._direct.maps.tiles),
             "shadow_maps_drawn": self._direct.maps.drawn,
             "shadow_resolution": self._direct.maps.atlas.tile if self._direct.maps.atlas else 0,

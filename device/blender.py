@@ -39,6 +39,7 @@ class BlenderDevice(Device):
     """The GPU of this Blender. Raises DeviceError where it has none (yet)."""
 
     def __init__(self):
+        super().__init__()
         try:
             backend = gpu.platform.backend_type_get()
             renderer = gpu.platform.renderer_get()

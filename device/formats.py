@@ -12,10 +12,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Format:
-    """``dtype`` is what reading gives; ``scalar`` ("FLOAT", "INT", "UINT") is what a shader sees."""
+    """``dtype`` is what reading gives; ``scalar`` ("FLOAT", "INT", "UINT") is what a shader sees.
+
+    ``bytes`` counts those of one texel on the GPU.
+    """
 
     channels: int
     dtype: type
+    bytes: int
     scalar: str = "FLOAT"
     is_depth: bool = False
 
@@ -26,19 +30,19 @@ class Format:
 
 
 FORMATS = {
-    "RGBA32F": Format(4, np.float32),
-    "RGBA16F": Format(4, np.float32),
-    "RG32F": Format(2, np.float32),
-    "RG16F": Format(2, np.float32),
-    "R32F": Format(1, np.float32),
-    "R16F": Format(1, np.float32),
-    "RGBA8": Format(4, np.uint8),
-    "RG8": Format(2, np.uint8),
-    "R8": Format(1, np.uint8),
-    "SRGB8_A8": Format(4, np.uint8),  # decoded to linear when sampled; not an image, not a render target
-    "R32UI": Format(1, np.uint32, "UINT"),
-    "R32I": Format(1, np.int32, "INT"),
-    "DEPTH32F": Format(1, np.float32, is_depth=True),  # headless: 24 bit
+    "RGBA32F": Format(4, np.float32, 16),
+    "RGBA16F": Format(4, np.float32, 8),
+    "RG32F": Format(2, np.float32, 8),
+    "RG16F": Format(2, np.float32, 4),
+    "R32F": Format(1, np.float32, 4),
+    "R16F": Format(1, np.float32, 2),
+    "RGBA8": Format(4, np.uint8, 4),
+    "RG8": Format(2, np.uint8, 2),
+    "R8": Format(1, np.uint8, 1),
+    "SRGB8_A8": Format(4, np.uint8, 4),  # decoded to linear when sampled; not an image, not a render target
+    "R32UI": Format(1, np.uint32, 4, "UINT"),
+    "R32I": Format(1, np.int32, 4, "INT"),
+    "DEPTH32F": Format(1, np.float32, 4, is_depth=True),  # headless: 24 bit
 }
 
 

@@ -30,6 +30,7 @@ class HeadlessDevice(Device):
     """A GPU without Blender. Raises DeviceError where no OpenGL 4.3 context can be made."""
 
     def __init__(self):
+        super().__init__()
         options: Any = {"backend": "egl"} if sys.platform == "linux" else {}
         try:
             ctx: Any = moderngl.create_context(standalone=True, require=430, **options)

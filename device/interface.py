@@ -5,6 +5,7 @@ A backend (blender.py, headless.py) supplies the underscored methods at the end 
 are checked here and in drawing.py, once for both.
 """
 
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,6 +34,14 @@ class Device(ABC):
     max_texture_size: int = 16384
     _busy: Shader | None = None
 
+    def __init__(self) -> None:
+        self._made: weakref.WeakSet[Texture | Vertices] = weakref.WeakSet()
+
+    @property
+    def allocated_bytes(self) -> int:
+        """GPU memory of the textures and vertices that were made here and not freed."""
+        return sum(resource.bytes for resource in self._made if resource.handle is not None)
+
     # --- resources ---------------------------------------------------------------------------------------------------
 
     def texture(self, size: Sequence[int], format: str, data: np.ndarray | None = None, *, layers: int = 0,
@@ -55,6 +64,7 @@ class Device(ABC):
             raise ValueError(f"texture filter {filter!r} is neither NEAREST nor LINEAR")
         texture = Texture(size, format, layers, filter, repeat)
         self._create_texture(texture, None if data is None else check_data(texture, data))
+        self._made.add(texture)
         return texture
 
     def target(self, colors: Sequence[Texture] = (), depth: Texture | None = None) -> Target:
@@ -85,6 +95,7 @@ class Device(ABC):
         vertices = Vertices(counts.pop(), layout)
         if vertices.count:
             self._create_vertices(vertices, arrays)
+        self._made.add(vertices)
         return vertices
 
     # --- work --------------------------------------------------------------------------------------------------------

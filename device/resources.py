@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a device makes and is told: textures, targets, vertices, the state of a draw."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -37,6 +38,11 @@ class Texture:
         outer = (self.layers,) if self.layers else ()
         return (*outer, *reversed(self.size), self.info.channels)
 
+    @property
+    def bytes(self) -> int:
+        """GPU memory, as far as the format tells."""
+        return math.prod(self.shape[:-1]) * self.info.bytes
+
     def __repr__(self) -> str:
         return f"Texture({self.size}, {self.format!r}{f', layers={self.layers}' if self.layers else ''})"
 
@@ -68,6 +74,11 @@ class Vertices:
         self.handle: Any = None
         #: Whatever the backend makes of it for a shader, by shader.
         self.cache: dict = {}
+
+    @property
+    def bytes(self) -> int:
+        """GPU memory: every component takes four bytes."""
+        return self.count * sum(4 * components for _, components in self.layout.values())
 
 
 @dataclass(frozen=True)

@@ -332,3 +332,13 @@ def test_compute_has_shared_memory_and_atomics(device):
     texture = device.texture((1, 1), "R32UI", np.array([[5]], np.uint32))
     device.dispatch(shader, (3, 2), sum_img=texture)
     assert device.read(texture)[0, 0, 0] == 5 + 6 * (63 * 64 // 2)
+
+
+def test_allocated_bytes_follow_what_is_made_and_freed(device):
+    before = device.allocated_bytes
+    texture = device.texture((8, 4), "RGBA16F")
+    vertices = device.vertices({"in_position": np.zeros((6, 3), np.float32)})
+    assert device.allocated_bytes - before == 8 * 4 * 8 + 6 * 3 * 4
+    device.free(texture)
+    device.free(vertices)
+    assert device.allocated_bytes == before
