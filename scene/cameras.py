@@ -21,16 +21,24 @@ def active_camera(depsgraph, engine=None):
     scene = depsgraph.scene_eval
     camera = (engine and engine.camera_override) or scene.camera
     if camera is None:
-        raise SceneError(f"Scene '{scene.name}' has no camera: add one, or make one active (View > Cameras > Set Active Object as Camera)")
+        raise SceneError(
+            f"Scene '{scene.name}' has no camera: add one, or choose one in Scene Properties > Scene > Camera"
+        )
     if camera.type != "CAMERA":
-        raise SceneError(f"Scene '{scene.name}' looks through '{camera.name}', which is no camera: choose a camera in Scene Properties")
+        raise SceneError(
+            f"Scene '{scene.name}' looks through '{camera.name}', which is no camera: "
+            "choose one in Scene Properties > Scene > Camera"
+        )
     return camera.evaluated_get(depsgraph)
 
 
 def camera_warning(camera) -> str | None:
     """One line if this camera can only be approximated."""
-    if camera.data.type in {"PANO", "CUSTOM"}:
-        return f"Camera '{camera.name}': its type {camera.data.type} is not supported; a perspective camera of its focal length stands in"
+    kind = camera.data.type
+    if kind in {"PANO", "CUSTOM"}:
+        return (
+            f"Camera '{camera.name}': type {kind} is not supported; a perspective camera of its focal length stands in"
+        )
     return None
 
 

@@ -64,9 +64,7 @@ class Changes:
             materials=before.materials != new.materials,
             lights=_changed_lights(before, new),
             world=first or before.world != new.world,
-            film=first
-            or before.film_transparent != new.film_transparent
-            or before.filter_width != new.filter_width,
+            film=first or before.film_transparent != new.film_transparent or before.filter_width != new.filter_width,
             moved_bounds=_moved_bounds(before, new, pairs),
         )
 
@@ -92,9 +90,7 @@ def _same_instance(a: Instance | None, b: Instance | None) -> bool:
 
 def _same_place(a: Instance, b: Instance) -> bool:
     return a is b or (
-        a.mesh == b.mesh
-        and a.visibility == b.visibility
-        and np.array_equal(a.world_from_object, b.world_from_object)
+        a.mesh == b.mesh and a.visibility == b.visibility and np.array_equal(a.world_from_object, b.world_from_object)
     )
 
 

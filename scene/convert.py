@@ -56,7 +56,7 @@ class _SceneReader:
         self.visible = visible
         self.warnings: dict[str, None] = {}  # an ordered set: each line once
         self.images = ImageReader(previous.images, self.warn)
-        self.materials = MaterialTable(self.images, self.warn, frame=depsgraph.scene_eval.frame_current)
+        self.materials = MaterialTable(self.images, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
@@ -105,7 +105,7 @@ class _SceneReader:
         data = obj.data
         if not data.is_editmode:
             return self._mesh_of_key(obj, data, mesh_key(data))
-        # The arrays of a mesh in edit mode are BMesh's; a temporary mesh holds them for us, and only its content names it.
+        # In edit mode the arrays are BMesh's: a temporary mesh holds them for us, and only its content names it.
         mesh = obj.to_mesh()
         try:
             return self._mesh_of_key(obj, mesh, content_key(mesh))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 from collections.abc import Callable, Hashable, Mapping
 
 import bpy
@@ -32,41 +33,66 @@ class ImageReader:
         self.images: dict[Hashable, Image] = {}
         self._previous = previous
         self._warn = warn
-        self._done: dict[tuple[int, int], Hashable | None] = {}
+        self._done: dict[tuple[int, str], Hashable | None] = {}
 
-    def read(self, image, frame: int = 0) -> Hashable | None:
+    def read(self, image, user=None) -> Hashable | None:
         """Return the key of a bpy image's pixels, or None (and one warning) where there are no pixels.
 
-        ``frame`` only matters for image sequences and movies.
+        ``user`` is the ImageUser of the node that shows it; it knows the frame of an image sequence.
         """
         original = image.original or image
-        visit = (original.session_uid, frame)
+        path = frame_path(original, user)
+        visit = (original.session_uid, path)
         if visit not in self._done:
-            self._done[visit] = self._read(original, frame)
+            self._done[visit] = self._read(original, path)
         return self._done[visit]
 
-    def _read(self, image, frame: int) -> Hashable | None:
-        key = image_key(image, frame)
-        found = self._previous.get(key)
+    def _read(self, image, path: str) -> Hashable | None:
+        key = image_key(image, path)
+        found = self._previous.get(key) or (_read_frame(image, key, path) if path else read_image(image, key))
         if found is None:
-            width, height = image.size  # loads the file
-            if not (image.has_data and width and height and image.channels):
-                self._warn(f"Image '{image.name}': {_missing(image)}; magenta is shown instead")
-                return None
-            found = read_image(image, key, width, height)
+            name = path or image.filepath
+            reason = f"the file '{name}' is missing or cannot be read" if name else "it has no pixels"
+            self._warn(f"Image '{image.name}': {reason}; magenta is shown instead")
+            return None
         for line in found.warnings:
             self._warn(line)
         self.images[key] = found
         return key
 
 
-def read_image(image, key: Hashable, width: int, height: int) -> Image:
-    """Read the pixels of a bpy image that is loaded."""
+def frame_path(image, user) -> str:
+    """The file of an image sequence's current frame; "" for any other image."""
+    if image.source != "SEQUENCE" or user is None:
+        return ""
+    return bpy.path.abspath(image.filepath_from_user(image_user=user), library=image.library)
+
+
+def _read_frame(image, key: Hashable, path: str) -> Image | None:
+    """Read one frame of a sequence through a temporary data-block: Image.pixels itself knows no frame.
+
+    Only on the main thread, where data-blocks may be made; elsewhere the frame counts as missing.
+    """
+    if threading.current_thread() is not threading.main_thread() or not os.path.isfile(path):
+        return None
+    frame = bpy.data.images.load(path)
+    try:
+        frame.colorspace_settings.name, frame.alpha_mode = image.colorspace_settings.name, image.alpha_mode
+        return read_image(frame, key)
+    finally:
+        bpy.data.images.remove(frame)
+
+
+def read_image(image, key: Hashable) -> Image | None:
+    """Read the pixels of a bpy image, or None where it has none. The file is loaded if it was not yet."""
+    width, height = image.size
+    if not (image.has_data and width and height and image.channels):
+        return None
     warnings = []
     if image.source == "TILED":
         warnings.append(f"Image '{image.name}': only the first UDIM tile is shown")
-    if image.source in {"SEQUENCE", "MOVIE"}:
-        warnings.append(f"Image '{image.name}': of an animated image only the frame that Blender has loaded is shown")
+    if image.source == "MOVIE":
+        warnings.append(f"Image '{image.name}': of a movie only the frame that Blender has loaded is shown")
     raw = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(raw)
     raw = raw.reshape(height, width, image.channels)
@@ -99,31 +125,33 @@ def _to_linear(image, warn: Callable[[str], None]) -> Callable[[Array], Array]:
     return _decode_srgb
 
 
-def image_key(image, frame: int) -> Hashable:
-    """The key of a bpy image's pixels, found without reading them (but where they were painted on)."""
+def image_key(image, path: str = "") -> Hashable:
+    """The key of a bpy image's pixels, found without reading them (but where they were painted on).
+
+    ``path`` is the file of a sequence's frame.
+    """
     state = (
         image.session_uid,
         image.filepath,
         image.source,
         image.colorspace_settings.name,
         image.alpha_mode,
-        _file_time(image),
+        path,
+        _file_time(image, path),
     )
     if image.source == "GENERATED" and not image.is_dirty:
         size = (image.generated_width, image.generated_height)
         return (*state, size, image.use_generated_float, image.generated_type, tuple(image.generated_color))
-    if image.source in {"SEQUENCE", "MOVIE"}:
-        return (*state, frame)
     if image.is_dirty and image.has_data:
         return (*state, _pixel_hash(image))
     return state
 
 
-def _file_time(image) -> int:
+def _file_time(image, path: str) -> int:
     """When the file behind an image was written: a reload after an edit elsewhere is seen by it. 0 without a file."""
     if image.packed_file or not image.filepath:
         return 0
-    path = bpy.path.abspath(image.filepath, library=image.library)
+    path = path or bpy.path.abspath(image.filepath, library=image.library)
     return os.stat(path).st_mtime_ns if os.path.isfile(path) else 0
 
 
@@ -132,10 +160,6 @@ def _pixel_hash(image) -> bytes:
     raw = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(raw)
     return hashlib.blake2b(raw.data, digest_size=16).digest()
-
-
-def _missing(image) -> str:
-    return f"the file '{image.filepath}' is missing or cannot be read" if image.filepath else "it has no pixels"
 
 
 def _rgba(raw: Array) -> Array:

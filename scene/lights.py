@@ -42,7 +42,7 @@ def read_light(obj, matrix: Array, key: Hashable, lights_diffuse: bool, warn: Ca
 
 
 def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], None]) -> tuple[float, float, float]:
-    """RGB power of a bpy light: energy, colour, temperature, exposure, nodes, and its size where it is not normalised."""
+    """RGB power of a bpy light: energy, colour, temperature, exposure, nodes; its size too if it is not normalised."""
     color = np.array(light.color, np.float64)
     if light.use_temperature:
         color *= np.array(light.temperature_color, np.float64)
@@ -55,11 +55,11 @@ def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], Non
     if not np.isfinite(power).all() or (power < 0.0).any():
         warn(f"Light '{light.name}': its power is negative or not a number; it is left out")
         return (0.0, 0.0, 0.0)
-    return tuple(float(value) for value in power)
+    return float(power[0]), float(power[1]), float(power[2])
 
 
 def normalization(light, kind: LightKind, matrix: Array) -> float:
-    """What Cycles divides a normalised light's power by: by this much an absolute light of the same look is stronger."""
+    """What Cycles divides a normalised light's power by; one that is not normalised counts as this much stronger."""
     if kind is LightKind.SUN:
         half = light.angle / 2.0
         return math.pi * math.sin(half) ** 2 if half > 0.0 else 1.0

@@ -66,7 +66,6 @@ class MaterialTable:
 
     images: ImageReader
     warn: Callable[[str], None]
-    frame: int = 0
     materials: list[Material] = field(default_factory=lambda: [Material("Default")])
     _index: dict[int, int] = field(default_factory=dict)
     _approximated: dict[str, dict[str, None]] = field(default_factory=dict)
@@ -188,7 +187,7 @@ class _Reader:
         )
 
     def sum_paint(self, a: Paint, wa: float, b: Paint, wb: float, multiplies: bool) -> Paint:
-        """A weighted sum. Only one image survives, that of the heavier shader; an image that ``multiplies`` keeps its weight."""
+        """A weighted sum. Only one image survives, the heavier shader's; one that ``multiplies`` keeps its weight."""
         if a.texture is None and b.texture is None:
             return Paint(tuple(wa * x + wb * y for x, y in zip(a.rgb, b.rgb, strict=True)))
         first_wins = (a.texture is not None, wa) >= (b.texture is not None, wb)
@@ -239,7 +238,7 @@ class _Reader:
             return Paint(default_rgb(socket.socket))
         if node.image is None:
             return Paint(BLACK)  # as in Cycles: an Image Texture node without an image is black
-        key = self.table.images.read(node.image, self.table.frame)
+        key = self.table.images.read(node.image, node.image_user)
         if key is None:
             return Paint(MAGENTA)
         if node.projection != "FLAT":

@@ -75,7 +75,7 @@ def _step(at: Socket) -> Socket | None:
         return None
     node = at.node
     if node.mute:
-        return next((Socket(l.from_socket, at.groups) for l in node.internal_links if l.to_socket == at.socket), None)
+        return _muted_source(at)
     if node.bl_idname == "NodeReroute":
         return Socket(node.inputs[0], at.groups)
     if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
@@ -83,6 +83,14 @@ def _step(at: Socket) -> Socket | None:
     if node.bl_idname == "NodeGroupInput" and at.groups:
         *outer, group = at.groups
         return _by_identifier(group.inputs, at.socket, tuple(outer))
+    return None
+
+
+def _muted_source(at: Socket) -> Socket | None:
+    """The input that a muted node passes on to an output."""
+    for link in at.node.internal_links:
+        if link.to_socket == at.socket:
+            return Socket(link.from_socket, at.groups)
     return None
 
 
@@ -121,7 +129,9 @@ def constant(socket: Socket) -> RGB | None:
 
 
 def mean(rgb: RGB) -> float:
-    """A colour used as a number, by Blender's implicit conversion (Rec. 709 luminance; exact for grey)."""
+    """A colour used as a number, by Blender's implicit conversion (Rec. 709 luminance)."""
+    if rgb[0] == rgb[1] == rgb[2]:
+        return rgb[0]
     return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 
 

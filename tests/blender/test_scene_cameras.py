@@ -229,7 +229,9 @@ def test_camera_that_is_no_camera_is_an_error():
         cameras.active_camera(bpy.context.evaluated_depsgraph_get())
 
 
-@pytest.mark.parametrize(("name", "value"), [("location", (math.nan, 0, 0)), ("location", (math.inf, 0, 0)), ("scale", (0, 0, 0))])
+@pytest.mark.parametrize(
+    ("name", "value"), [("location", (math.nan, 0, 0)), ("location", (math.inf, 0, 0)), ("scale", (0, 0, 0))]
+)
 def test_camera_with_a_broken_transform_is_an_error(name, value):
     setattr(camera(), name, value)
     with pytest.raises(SceneError, match="'Camera'"):

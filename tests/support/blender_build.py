@@ -66,12 +66,16 @@ def shader_material(name, node_type, **inputs):
 
 
 def scatter_nodes(obj, scattered=None, realize=False):
-    """A geometry nodes modifier: instances of a mesh cube, or of ``scattered`` (a collection), on a 2×2 grid of points."""
+    """A geometry nodes modifier: a mesh cube, or the collection ``scattered``, instanced on a 2×2 grid of points."""
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     nodes, links = tree.nodes, tree.links
-    grid, scatter, output = nodes.new("GeometryNodeMeshGrid"), nodes.new("GeometryNodeInstanceOnPoints"), nodes.new("NodeGroupOutput")
+    grid, scatter, output = (
+        nodes.new("GeometryNodeMeshGrid"),
+        nodes.new("GeometryNodeInstanceOnPoints"),
+        nodes.new("NodeGroupOutput"),
+    )
     grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = 2
     if scattered is None:
         source = nodes.new("GeometryNodeMeshCube")

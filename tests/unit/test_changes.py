@@ -88,7 +88,9 @@ def test_visibility_change_is_an_instance_change():
 
 
 def test_recoloured_material_marks_who_wears_it():
-    old = scene(instance("a", materials=(0,)), instance("b", x=7, materials=(1,)), materials=(Material("X"), Material("Y")))
+    old = scene(
+        instance("a", materials=(0,)), instance("b", x=7, materials=(1,)), materials=(Material("X"), Material("Y"))
+    )
     red = replace(Material("Y"), base_color=(1.0, 0.0, 0.0))
     new = scene(instance("a", materials=(0,)), instance("b", x=7, materials=(1,)), materials=(Material("X"), red))
     changes = Changes.between(old, new)

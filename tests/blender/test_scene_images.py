@@ -1,0 +1,251 @@
+"""Images arrive scene-linear, whatever they are made of; missing ones are magenta."""
+
+import bpy
+import numpy as np
+import pytest
+
+from rebound.scene import images
+from rebound.scene.changes import Changes
+from rebound.tests.support.blender_build import convert, link, material, mesh
+
+pytestmark = pytest.mark.usefixtures("clean_scene")
+
+
+def textured(image, socket="Base Color"):
+    """A quad with an image on it; returns the Image Texture node."""
+    made = material("Painted", (0.2, 0.3, 0.4))
+    tree = made.node_tree
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs[socket])
+    data = mesh()
+    data.uv_layers.new(name="UVMap")
+    data.materials.append(made)
+    link("Quad", data)
+    return node
+
+
+def painted(name="Image", float_buffer=False, size=(2, 2), pixels=None, space=None):
+    image = bpy.data.images.new(name, *size, alpha=True, float_buffer=float_buffer)
+    if space:
+        image.colorspace_settings.name = space
+    if pixels is not None:
+        image.pixels.foreach_set(np.asarray(pixels, np.float32).ravel())
+        image.update()
+    return image
+
+
+def material_of(scene):
+    return scene.materials[scene.instances[0].materials[0]]
+
+
+def pixels_of(scene):
+    found = scene.images[material_of(scene).base_color_texture.image]
+    assert found.pixels.dtype == np.float32 and found.pixels.shape[2] == 4
+    return found.pixels
+
+
+RAMP = np.array([[[0, 0.2, 0.4, 1], [0.6, 0.8, 1, 0.4]], [[1, 0, 0, 1], [0, 1, 0, 1]]])
+
+
+def test_byte_srgb_is_decoded():
+    textured(painted(pixels=RAMP))
+    stored = np.rint(RAMP * 255) / 255
+    linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    expected = np.concatenate((linear[..., :3], stored[..., 3:]), axis=-1)
+    scene = convert()
+    np.testing.assert_allclose(pixels_of(scene), expected, atol=2e-6)
+    assert scene.warnings == ()
+
+
+def test_byte_data_is_taken_as_it_is():
+    textured(painted(pixels=RAMP, space="Non-Color"))
+    np.testing.assert_allclose(pixels_of(convert()), RAMP, atol=1e-6)
+
+
+def test_float_image_is_taken_as_it_is():
+    textured(painted(pixels=RAMP * (4, 4, 4, 1), float_buffer=True))
+    np.testing.assert_allclose(pixels_of(convert()), RAMP * (4, 4, 4, 1), atol=1e-6)
+
+
+def test_linear_spaces_are_converted_and_others_named():
+    image = painted(pixels=RAMP, space="Linear Rec.709")
+    textured(image)
+    np.testing.assert_allclose(pixels_of(convert()), np.rint(RAMP * 255) / 255, atol=1e-4)
+    image.colorspace_settings.name = "Filmic sRGB"
+    image.pixels.foreach_set(RAMP.astype(np.float32).ravel())
+    assert any("'Filmic sRGB'" in line for line in convert().warnings)
+
+
+def test_saved_file_and_packed_file_are_read_alike(tmp_path):
+    image = painted(pixels=RAMP)
+    image.file_format, image.filepath_raw = "PNG", str(tmp_path / "ramp.png")
+    image.save()
+    loaded = bpy.data.images.load(str(tmp_path / "ramp.png"))
+    loaded.pack()
+    textured(image)
+    first = pixels_of(convert())
+    bpy.data.objects["Quad"].data.materials[0].node_tree.nodes["Image Texture"].image = loaded
+    np.testing.assert_allclose(pixels_of(convert()), first, atol=1e-6)
+
+
+def test_premultiplied_exr_is_straightened(tmp_path):
+    exr = pytest.importorskip("OpenEXR")
+    channels = {name: np.full((2, 2), 0.5 if name == "A" else 0.25, np.float32) for name in "RGBA"}
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+    with exr.File(header, channels) as file:
+        file.write(str(tmp_path / "half.exr"))
+    loaded = bpy.data.images.load(str(tmp_path / "half.exr"))
+    textured(loaded)
+    np.testing.assert_allclose(pixels_of(convert())[0, 0], (0.5, 0.5, 0.5, 0.5), atol=1e-4)
+    loaded.alpha_mode = "NONE"
+    np.testing.assert_allclose(pixels_of(convert())[0, 0], (0.25, 0.25, 0.25, 1), atol=1e-4)
+
+
+def test_missing_file_is_magenta_and_named():
+    image = bpy.data.images.new("Lost", 1, 1)
+    image.source, image.filepath = "FILE", "//nowhere/brick.png"
+    textured(image)
+    scene = convert()
+    assert material_of(scene).base_color == (1, 0, 1) and material_of(scene).base_color_texture is None
+    assert scene.images == {}
+    assert len(scene.warnings) == 1 and "'Lost'" in scene.warnings[0] and "brick.png" in scene.warnings[0]
+
+
+def test_file_that_is_no_image_is_magenta_and_named(tmp_path):
+    (tmp_path / "broken.png").write_bytes(b"not a picture")
+    textured(bpy.data.images.load(str(tmp_path / "broken.png")))
+    scene = convert()
+    assert material_of(scene).base_color == (1, 0, 1) and "broken.png" in scene.warnings[0]
+
+
+def test_texture_node_without_an_image_is_black():
+    textured(None)
+    scene = convert()
+    assert material_of(scene).base_color == (0, 0, 0) and scene.warnings == ()
+
+
+def test_emission_texture_is_multiplied_by_the_strength():
+    node = textured(painted(pixels=RAMP), socket="Emission Color")
+    node.id_data.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 5
+    found = material_of(convert())
+    assert found.emission == (5, 5, 5) and found.emission_texture is not None
+    assert found.base_color_texture is None
+
+
+def test_texture_settings_are_read():
+    node = textured(painted(pixels=RAMP))
+    node.extension, node.interpolation = "EXTEND", "Closest"
+    uv = node.id_data.nodes.new("ShaderNodeUVMap")
+    uv.uv_map = "Second"
+    node.id_data.links.new(uv.outputs[0], node.inputs["Vector"])
+    texture = material_of(convert()).base_color_texture
+    assert (texture.uv_map, texture.repeat, texture.closest) == ("Second", False, True)
+
+
+@pytest.mark.parametrize("output", ["UV", "Generated"])
+def test_texture_coordinates_other_than_uv_are_named(output):
+    node = textured(painted(pixels=RAMP))
+    coordinates = node.id_data.nodes.new("ShaderNodeTexCoord")
+    node.id_data.links.new(coordinates.outputs[output], node.inputs["Vector"])
+    scene = convert()
+    assert material_of(scene).base_color_texture.uv_map == ""
+    assert len(scene.warnings) == (output != "UV")
+
+
+def test_large_image_is_averaged_down(monkeypatch):
+    monkeypatch.setattr(images, "MAX_SIZE", 4)
+    pixels = np.zeros((8, 12, 4))
+    pixels[..., 3] = 1
+    pixels[:, 6:, 0] = 2
+    textured(painted(size=(12, 8), pixels=pixels, float_buffer=True))
+    scene = convert()
+    found = pixels_of(scene)
+    assert found.shape == (2, 4, 4)
+    np.testing.assert_allclose(found[..., 0], [[0, 0, 2, 2]] * 2)
+    assert len(scene.warnings) == 1 and "'Image'" in scene.warnings[0]
+    assert convert(previous=scene).warnings == scene.warnings
+
+
+def test_averaging_keeps_a_narrow_image():
+    raw = np.ones((1, 9, 4), np.float32)
+    assert images._averaged(raw, 3, lambda pixels: pixels).shape == (1, 3, 4)
+
+
+def test_unchanged_image_is_the_same_object_and_a_painted_one_is_not():
+    image = painted(pixels=RAMP)
+    textured(image)
+    first = convert()
+    second = convert(previous=first)
+    assert not Changes.between(first, second).any
+    assert pixels_of(second) is pixels_of(first)
+    image.pixels[0] = 0.5
+    image.update()
+    changes = Changes.between(second, convert(previous=second))
+    assert len(changes.images_added) == len(changes.images_removed) == 1
+    assert len(changes.moved_bounds) == 2  # what wears it looks different now
+
+
+def test_color_space_change_makes_a_new_image():
+    image = painted(pixels=RAMP)
+    textured(image)
+    first = convert()
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(RAMP.astype(np.float32).ravel())
+    assert convert(previous=first).images.keys() != first.images.keys()
+
+
+def test_image_on_two_materials_is_read_once():
+    image = painted(pixels=RAMP)
+    textured(image)
+    textured(image)
+    assert len(convert().images) == 1
+
+
+def test_tiled_image_shows_its_first_tile(tmp_path):
+    for number, value in ((1001, 0.25), (1002, 0.75)):
+        tile = painted(str(number), pixels=np.full((2, 2, 4), value), space="Non-Color")
+        tile.file_format, tile.filepath_raw = "PNG", str(tmp_path / f"tile.{number}.png")
+        tile.save()
+    image = bpy.data.images.load(str(tmp_path / "tile.1001.png"))
+    image.colorspace_settings.name = "Non-Color"
+    image.source = "TILED"
+    image.filepath = str(tmp_path / "tile.<UDIM>.png")
+    image.tiles.new(1002)
+    textured(image)
+    scene = convert()
+    assert pixels_of(scene)[0, 0, 0] == pytest.approx(0.25, abs=0.01)
+    assert any("UDIM" in line for line in scene.warnings)
+
+
+def sequence(tmp_path):
+    for frame in (1, 2, 3):
+        picture = painted(str(frame), pixels=np.full((2, 2, 4), frame / 4), space="Non-Color")
+        picture.file_format, picture.filepath_raw = "PNG", str(tmp_path / f"clip{frame:04}.png")
+        picture.save()
+        bpy.data.images.remove(picture)
+    image = bpy.data.images.load(str(tmp_path / "clip0001.png"))
+    image.colorspace_settings.name, image.source = "Non-Color", "SEQUENCE"
+    node = textured(image)
+    node.image_user.frame_duration, node.image_user.use_auto_refresh = 3, True
+    return image
+
+
+def test_sequence_shows_the_frame_of_the_scene(tmp_path):
+    sequence(tmp_path)
+    previous = None
+    for frame in (1, 2, 3):
+        bpy.context.scene.frame_set(frame)
+        scene = convert(previous=previous)
+        assert pixels_of(scene)[0, 0, 0] == pytest.approx(frame / 4, abs=0.01)
+        assert scene.warnings == () and len(bpy.data.images) == 1
+        previous = scene
+
+
+def test_missing_frame_of_a_sequence_is_magenta(tmp_path):
+    sequence(tmp_path)
+    (tmp_path / "clip0002.png").unlink()
+    bpy.context.scene.frame_set(2)
+    scene = convert()
+    assert material_of(scene).base_color == (1, 0, 1)
+    assert len(scene.warnings) == 1 and "clip0002.png" in scene.warnings[0]

@@ -1,0 +1,240 @@
+"""The common shaders are read exactly; what is not read gives one line and something visible."""
+
+import bpy
+import pytest
+
+from rebound.scene.data import Material
+from rebound.tests.support.blender_build import convert, link, material, mesh, shader_material
+
+pytestmark = pytest.mark.usefixtures("clean_scene")
+
+
+def read(made):
+    """The Material and the warnings of a bpy material on a quad."""
+    data = mesh()
+    data.materials.append(made)
+    link("Quad", data)
+    scene = convert()
+    return scene.materials[scene.instances[0].materials[0]], scene.warnings
+
+
+def rgb(*values):
+    return pytest.approx(values, abs=1e-6)
+
+
+def group_of(tree, *nodes_type):
+    """An empty node group, placed in a tree; returns (group tree, its node in the tree)."""
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    return group, node
+
+
+def test_principled_base_color_and_emission():
+    made = material("Paint", (0.1, 0.2, 0.3))
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Color"].default_value = (1, 0.5, 0.25, 1)
+    shader.inputs["Emission Strength"].default_value = 4
+    found, warnings = read(made)
+    assert found.name == "Paint" and warnings == ()
+    assert found.base_color == rgb(0.1, 0.2, 0.3) and found.emission == rgb(4, 2, 1)
+
+
+def test_principled_does_not_emit_by_default():
+    assert read(material("Plain"))[0].emission == (0, 0, 0)
+
+
+def test_diffuse_and_emission_shaders():
+    made, _ = shader_material("Diffuse", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.2, 0.1, 1))
+    assert read(made)[0] == Material(
+        "Diffuse", base_color=made.node_tree.nodes["Diffuse BSDF"].inputs[0].default_value[:3]
+    )
+    made, _ = shader_material("Lamp", "ShaderNodeEmission", Color=(1, 0.5, 0, 1), Strength=3.0)
+    found = convert_second(made)
+    assert found.base_color == (0, 0, 0) and found.emission == rgb(3, 1.5, 0)
+
+
+def convert_second(made):
+    bpy.data.objects["Quad"].data.materials[0] = made
+    scene = convert()
+    return scene.materials[scene.instances[0].materials[0]]
+
+
+def test_material_without_a_surface_is_black():
+    made = material("Nothing")
+    made.node_tree.links.clear()
+    assert read(made)[0].base_color == (0, 0, 0)
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 0, 0), reason="Blender 5.0 and later always use the nodes")
+def test_material_without_nodes_shows_its_viewport_color():
+    made = bpy.data.materials.new("Old")
+    made.diffuse_color = (0.25, 0.5, 0.75, 1)
+    assert read(made)[0].base_color == rgb(0.25, 0.5, 0.75)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0])
+def test_mix_shader_is_a_weighted_average(factor):
+    made, mix = shader_material("Mixed", "ShaderNodeMixShader", Fac=factor)
+    tree = made.node_tree
+    diffuse, emission = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeEmission")
+    diffuse.inputs["Color"].default_value = (0.8, 0.4, 0.2, 1)
+    emission.inputs["Strength"].default_value = 2
+    emission.inputs["Color"].default_value = (1, 1, 1, 1)
+    tree.links.new(diffuse.outputs[0], mix.inputs[1])
+    tree.links.new(emission.outputs[0], mix.inputs[2])
+    found, warnings = read(made)
+    assert found.base_color == rgb(*((1 - factor) * c for c in (0.8, 0.4, 0.2)))
+    assert found.emission == rgb(*(2 * factor,) * 3) and warnings == ()
+
+
+def test_add_shader_sums():
+    made, add = shader_material("Sum", "ShaderNodeAddShader")
+    tree = made.node_tree
+    for slot, color in enumerate([(0.3, 0.1, 0, 1), (0.2, 0.2, 0, 1)]):
+        node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        node.inputs["Color"].default_value = color
+        tree.links.new(node.outputs[0], add.inputs[slot])
+    assert read(made)[0].base_color == rgb(0.5, 0.3, 0)
+
+
+def test_constants_come_through_reroutes_and_value_nodes():
+    made, shader = shader_material("Routed", "ShaderNodeEmission")
+    tree = made.node_tree
+    color, reroute, value = (tree.nodes.new(t) for t in ("ShaderNodeRGB", "NodeReroute", "ShaderNodeValue"))
+    color.outputs[0].default_value = (0.5, 0.25, 0.125, 1)
+    value.outputs[0].default_value = 8
+    tree.links.new(color.outputs[0], reroute.inputs[0])
+    tree.links.new(reroute.outputs[0], shader.inputs["Color"])
+    tree.links.new(value.outputs[0], shader.inputs["Strength"])
+    found, warnings = read(made)
+    assert found.emission == rgb(4, 2, 1) and warnings == ()
+
+
+def test_shader_and_constant_in_a_group_are_followed():
+    made = material("Grouped")
+    tree = made.node_tree
+    output = tree.nodes["Material Output"]
+    tree.nodes.remove(tree.nodes["Principled BSDF"])
+    group, node = group_of(tree)
+    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    inside, diffuse, outside = (
+        group.nodes.new(t) for t in ("NodeGroupInput", "ShaderNodeBsdfDiffuse", "NodeGroupOutput")
+    )
+    group.links.new(inside.outputs["Tint"], diffuse.inputs["Color"])
+    group.links.new(diffuse.outputs[0], outside.inputs["Shader"])
+    node.inputs["Tint"].default_value = (0.1, 0.6, 0.2, 1)
+    tree.links.new(node.outputs["Shader"], output.inputs["Surface"])
+    found, warnings = read(made)
+    assert found.base_color == rgb(0.1, 0.6, 0.2) and warnings == ()
+
+
+def test_muted_node_is_passed_by():
+    made = material("Muted", (0.2, 0.2, 0.2))
+    tree = made.node_tree
+    gamma, color = tree.nodes.new("ShaderNodeGamma"), tree.nodes.new("ShaderNodeRGB")
+    color.outputs[0].default_value = (0.7, 0.1, 0.1, 1)
+    tree.links.new(color.outputs[0], gamma.inputs["Color"])
+    tree.links.new(gamma.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    gamma.mute = True
+    found, warnings = read(made)
+    assert found.base_color == rgb(0.7, 0.1, 0.1) and warnings == ()
+
+
+def test_unread_node_falls_back_to_the_socket_with_one_line():
+    made = material("Checked", (0.2, 0.3, 0.4))
+    tree = made.node_tree
+    checker, shader = tree.nodes.new("ShaderNodeTexChecker"), tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Strength"].default_value = 1
+    tree.links.new(checker.outputs[0], shader.inputs["Base Color"])
+    tree.links.new(checker.outputs[0], shader.inputs["Emission Color"])
+    found, warnings = read(made)
+    assert found.base_color == rgb(0.2, 0.3, 0.4)
+    assert len(warnings) == 1 and "'Checked'" in warnings[0] and "'Checker Texture'" in warnings[0]
+
+
+def test_glossy_shader_is_shown_as_diffuse_with_one_line():
+    made, _ = shader_material("Mirror", "ShaderNodeBsdfAnisotropic", Color=(0.9, 0.8, 0.1, 1))
+    found, warnings = read(made)
+    assert found.base_color == rgb(0.9, 0.8, 0.1)
+    assert len(warnings) == 1 and "'Mirror'" in warnings[0]
+
+
+def test_unknown_shader_is_grey_with_one_line():
+    made, _ = shader_material("Hairy", "ShaderNodeBsdfHairPrincipled")
+    found, warnings = read(made)
+    assert found.base_color == rgb(0.8, 0.8, 0.8)
+    assert len(warnings) == 1 and "'Hairy'" in warnings[0]
+
+
+def test_metallic_materials_are_counted_in_one_line():
+    for number in range(5):
+        made = material(f"Metal {number}")
+        made.node_tree.nodes["Principled BSDF"].inputs["Metallic"].default_value = 1
+        found, warnings = read(made)
+    assert len(warnings) == 1 and "5 materials" in warnings[0] and "'Metal 0'" in warnings[0]
+
+
+def test_value_that_is_not_finite_is_zero():
+    made, shader = shader_material("Broken", "ShaderNodeEmission")
+    value = made.node_tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = float("nan")
+    made.node_tree.links.new(value.outputs[0], shader.inputs["Strength"])
+    assert read(made)[0].emission == (0, 0, 0)
+
+
+def test_shared_material_is_read_once():
+    made = material("Shared")
+    read(made)
+    read(made)
+    assert [found.name for found in convert().materials] == ["Default", "Shared"]
+
+
+def test_output_for_all_renderers_is_preferred():
+    made = material("Two outputs", (0.5, 0, 0))
+    tree = made.node_tree
+    special, emission = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeEmission")
+    special.target = "CYCLES"
+    tree.links.new(emission.outputs[0], special.inputs["Surface"])
+    assert read(made)[0].base_color == rgb(0.5, 0, 0)
+
+
+# World
+
+
+def world(strength=1.0, color=(0.1, 0.2, 0.3)):
+    made = bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    if bpy.app.version < (5, 0, 0):
+        made.use_nodes = True
+    background = made.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (*color, 1)
+    background.inputs["Strength"].default_value = strength
+    return made
+
+
+def test_world_color_times_strength():
+    world(strength=3)
+    scene = convert()
+    assert scene.world.color == rgb(0.3, 0.6, 0.9) and scene.warnings == ()
+
+
+def test_no_world_is_black():
+    bpy.context.scene.world = None
+    assert convert().world.color == (0, 0, 0)
+
+
+def test_world_texture_is_replaced_by_the_sockets_color_with_one_line():
+    made = world(strength=2)
+    texture = made.node_tree.nodes.new("ShaderNodeTexSky")
+    made.node_tree.links.new(texture.outputs[0], made.node_tree.nodes["Background"].inputs["Color"])
+    scene = convert()
+    assert scene.world.color == rgb(0.2, 0.4, 0.6)
+    assert len(scene.warnings) == 1 and "'Sky'" in scene.warnings[0]
+
+
+def test_film_settings_are_read():
+    render = bpy.context.scene.render
+    render.film_transparent, render.filter_size = True, 2.25
+    scene = convert()
+    assert scene.film_transparent is True and scene.filter_width == pytest.approx(2.25)
