@@ -8,6 +8,7 @@ from rebound.scene.changes import Changes
 from rebound.scene.convert import convert_scene
 from rebound.scene.data import Visibility
 from rebound.tests.support.blender_build import CUBE, collection, convert, link, mesh, scatter_nodes
+from rebound.tests.support.probe_engine import probe_engine
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
 
@@ -137,11 +138,12 @@ def test_linked_library_objects_are_read(tmp_path):
     assert len(scene.meshes) == 1 and places(scene) == [(0, 0, 0), (1, 1, 1)]
 
 
-def test_ten_thousand_instances_are_quick():
+def test_many_objects_share_one_mesh():
     data = mesh()
-    objects = [link(f"Quad{i}", data, location=(i, 0, 0)) for i in range(2000)]
-    assert len(objects) == 2000
-    assert len(checked(convert()).instances) == 2000
+    for i in range(2000):
+        link(f"Quad{i}", data, location=(i, 0, 0))
+    scene = checked(convert())
+    assert len(scene.instances) == 2000 and len(scene.meshes) == 1
 
 
 # Visibility
@@ -240,3 +242,50 @@ def test_material_override_of_the_view_layer_is_worn_by_all():
     bpy.context.view_layer.material_override = bpy.data.materials.new("Clay")
     scene = convert()
     assert scene.materials[scene.instances[0].materials[0]].name == "Clay"
+
+
+# Final renders have a depsgraph of their own
+
+
+def final_scene(**options):
+    """What a render engine converts in render()."""
+    camera = link("Camera", bpy.data.cameras.new("Camera"))
+    bpy.context.scene.camera = camera
+    render = bpy.context.scene.render
+    render.resolution_x = render.resolution_y = 8
+    with probe_engine(lambda _, depsgraph: convert_scene(depsgraph, for_viewport=False, **options)) as run:
+        return checked(run())
+
+
+def test_final_render_has_its_own_hidden_objects_and_modifier_levels():
+    link("Viewport only", mesh(), hide_render=True)
+    shown = link("Render only", mesh(shape=CUBE), hide_viewport=True, location=(1, 0, 0))
+    subdivision = shown.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels, subdivision.render_levels = 0, 2
+    scene = final_scene()
+    assert places(scene) == [(1, 0, 0)]
+    assert scene.meshes[scene.instances[0].mesh].triangle_count == 6 * 16 * 2
+
+
+def test_final_render_sees_layer_holdout_and_indirect_only():
+    in_layer_collection().holdout = True
+    other = collection("Other", mesh("Other"))
+    bpy.context.scene.collection.children.link(other)
+    bpy.context.view_layer.layer_collection.children["Other"].indirect_only = True
+    found = {instance.visibility for instance in final_scene().instances}
+    assert found == {EVERYTHING | Visibility.HOLDOUT, Visibility.SHADOW | Visibility.BOUNCE}
+
+
+def test_final_render_follows_the_instancers_own_switch():
+    host = link("Host", mesh(), show_instancer_for_render=False)
+    host.instance_type = "FACES"
+    link("Child", mesh("Child", CUBE)).parent = host
+    scene = final_scene()
+    assert [found.triangle_count for found in scene.meshes.values()] == [12]
+
+
+def test_second_final_render_matches_the_first():
+    """Each render evaluates anew, so meshes have new keys; the instances keep theirs."""
+    scatter_nodes(link("Host", mesh()))
+    first, second = final_scene(), final_scene()
+    assert keys(first) == keys(second) and places(first) == places(second)
