@@ -30,6 +30,8 @@ from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SH
 
 # Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
 WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
+# Lookups of one pixel in one pass: Mesa's software renderer ends all loops of a shader after 65535 rounds, in silence.
+LONGEST_LOOP = 1 << 15
 Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
@@ -192,7 +194,8 @@ class Rsm:
         passes = self._all_passes if settings["estimator"] == "ALL_TEXELS" else self._disc_passes
         work = WORK_SOFTWARE if self.device.is_software else WORK_HARDWARE
         pixels = target.size[0] * target.size[1]
-        for shader, values, done in passes(self.maps.atlas, inputs, settings, max(work // max(pixels, 1), 1)):
+        texels = min(max(work // pixels, 1), LONGEST_LOOP)
+        for shader, values, done in passes(self.maps.atlas, inputs, settings, texels):
             self.device.fullscreen(shader, target, state=ADD, **shared, **values)
             yield done
 

@@ -6,6 +6,10 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy) * pc_stride + pc_offset;
   out_indirect = vec4(0.0);
+  /* The last pixels of a coarse grid may lie beyond the picture. */
+  if (any(greaterThanEqual(pixel, textureSize(position_tx, 0)))) {
+    return;
+  }
   vec4 position = texelFetch(position_tx, pixel, 0);
   if (position.w == 0.0 || rsm_reused(reused_tx, ivec2(gl_FragCoord.xy))) {
     return;

@@ -19,8 +19,9 @@ const float GATHER_PUBLISHED_MEAN = 1.0 / 3.0;
 struct Gather {
   vec3 P;
   vec3 N;
-  int face;   /* the face that looks the receiver's way */
-  vec2 place; /* the receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold */
+  int face; /* the face that looks the receiver's way */
+  vec2
+      place; /* the receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold */
 };
 
 vec3 gather_fetch(Gather g, int face_index, vec2 uv)
@@ -65,14 +66,14 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
     vec2 uv;
     if (disc) {
       uv = gather_disc_uv(g, xi);
-    }
-    else {
+    } else {
       float pick = xi.x * float(face_count);
       face = first_face + min(int(pick), face_count - 1);
       uv = vec2(fract(pick), xi.y);
     }
     float r = distance(uv, g.place);
-    float in_disc_density = face == g.face && r < pc_radius ? 1.0 / (2.0 * SAMPLING_PI * max(r, 1e-6) * pc_radius) : 0.0;
+    float in_disc_density =
+        face == g.face && r < pc_radius ? 1.0 / (2.0 * SAMPLING_PI * max(r, 1e-6) * pc_radius) : 0.0;
     float density = share * in_disc_density + (1.0 - share) / float(face_count);
     sum += gather_fetch(g, face, uv) / density;
   }
@@ -84,6 +85,10 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy) * pc_stride + pc_offset;
   out_indirect = vec4(0.0);
+  /* The last pixels of a coarse grid may lie beyond the picture. */
+  if (any(greaterThanEqual(pixel, textureSize(position_tx, 0)))) {
+    return;
+  }
   vec4 position = texelFetch(position_tx, pixel, 0);
   if (position.w == 0.0 || rsm_reused(reused_tx, ivec2(gl_FragCoord.xy))) {
     return;

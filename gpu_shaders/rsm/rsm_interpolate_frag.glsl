@@ -33,6 +33,9 @@ void main()
       continue;
     }
     ivec2 source = coarse * pc_stride + pc_offset;
+    if (any(greaterThanEqual(source, textureSize(position_tx, 0)))) {
+      continue;
+    }
     vec4 other = texelFetch(position_tx, source, 0);
     if (other.w == 0.0) {
       continue;
@@ -40,7 +43,8 @@ void main()
     vec3 other_N = octahedron_decode(texelFetch(normal_tx, source, 0).xy);
     vec3 apart = other.xyz - position.xyz;
     float plane = max(abs(dot(apart, geometric)), abs(dot(apart, N)));
-    if (dot(N, other_N) < INTERPOLATE_NORMAL || plane > INTERPOLATE_PLANE * length(apart) + 1e-6 * length(position.xyz)) {
+    if (dot(N, other_N) < INTERPOLATE_NORMAL ||
+        plane > INTERPOLATE_PLANE * length(apart) + 1e-6 * length(position.xyz)) {
       continue;
     }
     vec2 near = mix(1.0 - part, part, vec2(corner));

@@ -21,8 +21,8 @@ QUICK = {"shadow_resolution": 256, "rsm_resolution": 64, "rsm_gathers": 32}
 # --- meshes ----------------------------------------------------------------------------------------------------------
 
 
-def triangles(key, positions, normals=None) -> Mesh:
-    """A mesh from (3T, 3) corners; flat normals unless given."""
+def triangles(name, positions, normals=None) -> Mesh:
+    """A mesh from (3T, 3) corners; flat normals unless given. Its key is (name, what it holds)."""
     positions = np.asarray(positions, np.float32).reshape(-1, 3)
     if normals is None:
         a, b, c = positions.reshape(-1, 3, 3).astype(np.float64).transpose(1, 0, 2)
@@ -30,7 +30,9 @@ def triangles(key, positions, normals=None) -> Mesh:
         normals = np.repeat(flat / np.linalg.norm(flat, axis=1, keepdims=True), 3, axis=0)
     bounds = np.stack((positions.min(0), positions.max(0)))
     slots = ((0, 0, len(positions) // 3),)
-    return Mesh(key, positions, np.asarray(normals, np.float32), {}, "", slots, bounds)
+    normals = np.asarray(normals, np.float32)
+    key = (name, hash(positions.tobytes() + normals.tobytes()))
+    return Mesh(key, positions, normals, {}, "", slots, bounds)
 
 
 def quad_corners(center, u, v) -> Array:
@@ -40,12 +42,12 @@ def quad_corners(center, u, v) -> Array:
     return np.array([a, b, d, a, d, e])
 
 
-def quad(key, center=(0, 0, 0), u=(1, 0, 0), v=(0, 1, 0)) -> Mesh:
+def quad(name, center=(0, 0, 0), u=(1, 0, 0), v=(0, 1, 0)) -> Mesh:
     """One parallelogram; by default 2 x 2 m, facing up."""
-    return triangles(key, quad_corners(center, u, v))
+    return triangles(name, quad_corners(center, u, v))
 
 
-def box(key, low, high, inward=False) -> Mesh:
+def box(name, low, high, inward=False) -> Mesh:
     """An axis-aligned box; ``inward`` turns its normals to the inside (a room)."""
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     center, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -55,10 +57,10 @@ def box(key, low, high, inward=False) -> Mesh:
             n, u, v = (np.eye(3)[(axis + k) % 3] for k in range(3))
             flip = -1 if (sign < 0) != inward else 1
             sides.append(quad_corners(center + sign * n * half, flip * u * half, v * half))
-    return triangles(key, np.concatenate(sides))
+    return triangles(name, np.concatenate(sides))
 
 
-def sphere(key, center=(0, 0, 0), radius=1.0, rings=16, smooth=True) -> Mesh:
+def sphere(name, center=(0, 0, 0), radius=1.0, rings=16, smooth=True) -> Mesh:
     """A UV sphere of 2 * rings segments."""
     theta = np.linspace(0, math.pi, rings + 1)
     phi = np.linspace(0, 2 * math.pi, 2 * rings + 1)
@@ -72,8 +74,7 @@ def sphere(key, center=(0, 0, 0), radius=1.0, rings=16, smooth=True) -> Mesh:
             corners += [a, c, d] if i > 0 else []
             corners += [a, b, d] if i == rings - 1 else []
     unit = np.array(corners)
-    # The last ring's (a, b, d): b is the pole. Those of the first ring are (a, b, c), a the pole.
-    return triangles(key, np.asarray(center) + radius * unit, unit if smooth else None)
+    return triangles(name, np.asarray(center) + radius * unit, unit if smooth else None)
 
 
 # --- scenes ----------------------------------------------------------------------------------------------------------
@@ -90,7 +91,7 @@ def place(translation=(0, 0, 0), rotation=None, scale=(1, 1, 1)) -> Array:
 def aimed(position, target, up=(0, 1, 0)) -> Array:
     """(3, 3) rotation whose -Z looks from ``position`` to ``target``."""
     z = np.asarray(position, np.float64) - target
-    z /= np.linalg.norm(z)
+    z = z / np.linalg.norm(z) if z.any() else np.array([0.0, 0.0, 1.0])
     up = np.asarray(up, np.float64)
     if abs(z @ up) > 0.99 * np.linalg.norm(up):
         up = np.roll(up, 1)
@@ -110,17 +111,20 @@ def light(kind, position=(0, 0, 2), target=(0, 0, 0), power=100.0, key="light", 
 
 
 def scene(meshes, lights=(), albedo=0.8, matrices: Mapping[str, Array] | None = None, **fields) -> Scene:
-    """One instance for each mesh, all of one grey (or RGB) material, or with ``materials`` one for each mesh."""
+    """One instance for each mesh, all of one grey (or RGB) material, or with ``materials`` one for each mesh.
+
+    ``matrices`` and ``visibility`` go by the meshes' names, which are the instances' keys.
+    """
     materials = fields.pop("materials", None)
     visibility = fields.pop("visibility", {})
     table = materials or (Material("Grey", tuple(float(x) for x in np.broadcast_to(albedo, 3))),)
     instances = tuple(
         Instance(
-            mesh.key,
+            mesh.key[0],
             mesh.key,
             (i if materials else 0,),
-            (matrices or {}).get(mesh.key, np.eye(4)),
-            visibility.get(mesh.key, EVERYTHING),
+            (matrices or {}).get(mesh.key[0], np.eye(4)),
+            visibility.get(mesh.key[0], EVERYTHING),
         )
         for i, mesh in enumerate(meshes)
     )
@@ -131,7 +135,7 @@ def scaled(mesh_or_light, factor: float):
     """The same thing ``factor`` times as large; a light's power grows with the square, so that irradiance stays."""
     thing = mesh_or_light
     if isinstance(thing, Mesh):
-        return triangles(thing.key, thing.positions.astype(np.float64) * factor, thing.normals)
+        return triangles(thing.key[0], thing.positions.astype(np.float64) * factor, thing.normals)
     matrix = thing.world_from_light.copy()
     matrix[:3, 3] *= factor
     gain = 1.0 if thing.kind is LightKind.SUN else factor**2
