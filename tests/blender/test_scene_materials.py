@@ -4,7 +4,7 @@ import bpy
 import pytest
 
 from rebound.scene.data import Material
-from rebound.tests.support.blender_build import convert, link, material, mesh, shader_material
+from rebound.tests.support.blender_build import convert, link, material, mesh, scatter_nodes, shader_material
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
 
@@ -198,6 +198,22 @@ def test_output_for_all_renderers_is_preferred():
     special.target = "CYCLES"
     tree.links.new(emission.outputs[0], special.inputs["Surface"])
     assert read(made)[0].base_color == rgb(0.5, 0, 0)
+
+
+def test_material_set_by_geometry_nodes_is_worn_by_the_instances():
+    tree = scatter_nodes(link("Host", mesh()))
+    cube, scatter = (next(n for n in tree.nodes if n.bl_idname.endswith(end)) for end in ("MeshCube", "OnPoints"))
+    setter = tree.nodes.new("GeometryNodeSetMaterial")
+    setter.inputs["Material"].default_value = material("Set", (0.1, 0.2, 0.3))
+    tree.links.new(cube.outputs[0], setter.inputs[0])
+    tree.links.new(setter.outputs[0], scatter.inputs["Instance"])
+    scene = convert()
+    worn = {
+        scene.materials[instance.materials[slot]].name
+        for instance in scene.instances
+        for slot, _, _ in scene.meshes[instance.mesh].slots
+    }
+    assert len(scene.instances) == 4 and worn == {"Set"}
 
 
 # World
