@@ -12,7 +12,7 @@ import bpy
 from .device.interface import DeviceError
 from .final_render import render as render_final
 from .gpu_probe import missing_gpu
-from .main_thread import MainThreadError
+from .main_thread import MAIN_THREAD, MainThreadError
 from .render_result import register_passes
 from .renderer import RenderError
 from .scene.errors import SceneError
@@ -65,7 +65,8 @@ class ReboundEngine(bpy.types.RenderEngine):
         # Not made in __init__, which Blender calls twice for one object and for final renders too.
         if not hasattr(self, "viewport"):
             self.viewport = Viewport()
-            weakref.finalize(self, SESSIONS.orphans.append, self.viewport.session).atexit = False
+            # Blender destroys an engine object on any thread, mostly without a GPU context.
+            weakref.finalize(self, MAIN_THREAD.later, self.viewport.session.free).atexit = False
         return self.viewport
 
     def _fail(self, message: str) -> None:

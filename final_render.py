@@ -44,7 +44,7 @@ def render(engine, depsgraph) -> None:
 
 
 class _FinalRender:
-    """The steps of one render. ``_gpu`` runs a piece of work where the GPU context is."""
+    """The steps of one render."""
 
     def __init__(self, engine, depsgraph, session: Session) -> None:
         self.engine = engine
@@ -96,7 +96,7 @@ class _FinalRender:
             raise Cancelled
         cancelled = self.engine.test_break()
         patience = LAST_READ_SECONDS if cancelled else NO_ANSWER
-        pictures = MAIN_THREAD.run(lambda: _read(picture, self.passes), lambda: False, patience=patience)
+        pictures = self._gpu(lambda: _read(picture, self.passes), lambda: False, patience)
         fill(result, self.passes, pictures.__getitem__)
         ending = "cancelled after" if cancelled else "finished"
         seconds = time.monotonic() - self.started
@@ -115,8 +115,15 @@ class _FinalRender:
             self.logged = now
             LOGGER.info("sample %d/%d, %.1f s", picture.samples, self.total, now - self.started)
 
-    def _gpu(self, call: Callable[[], T]) -> T:
-        return MAIN_THREAD.run(call, self.engine.test_break)
+    def _gpu(self, call: Callable[[], T], cancelled: Callable[[], bool] | None = None, patience=NO_ANSWER) -> T:
+        """Run a piece of GPU work where the GPU context is."""
+
+        def work() -> T:
+            if not bpy.app.background:
+                self.session.context_may_differ()
+            return call()
+
+        return MAIN_THREAD.run(work, cancelled or self.engine.test_break, patience=patience)
 
 
 def _read(picture: Picture, passes: Sequence[RenderPass]) -> dict[str, np.ndarray]:

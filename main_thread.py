@@ -66,6 +66,10 @@ class MainThread:
         else:
             self._put(call)
 
+    def later(self, call: Callable[[], object]) -> None:
+        """Run ``call`` from the timer, when the main thread is sure to have its GPU context."""
+        self._put(call)
+
     def _put(self, call: Callable[[], object]) -> Future:
         future: Future = Future()
         self._jobs.put((future, call))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -162,6 +161,11 @@ class Session:
         gpu.upload(self.scene)
         return gpu.renderer.rsm_buffers(gpu.scene, settings)
 
+    def context_may_differ(self) -> None:
+        """To be said before work in a timer of Blender's (BlenderDevice.context_may_differ)."""
+        if self._gpu:
+            self._gpu.device.context_may_differ()
+
     def free(self) -> None:
         """Give back all GPU memory; the next picture starts from nothing. Harmless when repeated."""
         gpu, picture, self._gpu, self._picture = self._gpu, self._picture, None, None
@@ -171,7 +175,6 @@ class Session:
             gpu.free()
 
     def _ready(self) -> _Gpu:
-        SESSIONS.free_orphans()
         if self._gpu is None:
             self._gpu = _Gpu()
             self.status.device = self._gpu.device.name
@@ -179,31 +182,20 @@ class Session:
 
 
 class Sessions:
-    """What outlives every engine object.
-
-    Blender destroys an engine object on any thread, mostly without a GPU context: its session then waits among the
-    orphans for the next moment when GPU memory can be freed.
-    """
+    """What outlives every engine object: which sessions there are, and what the newest picture was made with."""
 
     def __init__(self) -> None:
         self.alive: weakref.WeakSet[Session] = weakref.WeakSet()
-        self.orphans: deque[Session] = deque()
         self.newest = Status()  # of the session that rendered last, for the panel
 
-    def free_orphans(self) -> None:
-        """Free the sessions whose engine is gone. To be called on the main thread."""
-        while self.orphans:
-            self.orphans.popleft().free()
-
     def free_all(self) -> None:
-        """Free every session, whether its engine is alive or not."""
-        self.free_orphans()
+        """Free every session, whether its engine is alive or not. To be called on the main thread."""
         for session in list(self.alive):
             session.free()
         self.newest = Status()
 
 
-# The one piece of module-level state beside the device's shader cache; the class says why there has to be one.
+# Module-level, because Blender gives panels and the disabling of an extension no way to the engine objects.
 SESSIONS = Sessions()
 
 

@@ -14,7 +14,8 @@ from .settings import Settings
 
 # Seconds of work between two redraws once there is a picture; navigation waits no longer than this.
 SECONDS_PER_DRAW = 0.1
-TEXT_SIZE = 14  # pixels at a display scale of 1
+TEXT_SIZE = 14  # pixels
+TEXT_COLOR = (1.0, 0.3, 0.1, 1.0)
 
 
 class Viewport:
@@ -62,14 +63,15 @@ class Viewport:
         if not self.error:
             return
         region = context.region
-        lines = textwrap.wrap(f"Rebound: {self.error}", max(region.width // TEXT_SIZE * 2 - 4, 20))
+        lines = textwrap.wrap(f"Rebound: {self.error}", max(region.width // TEXT_SIZE - 4, 20))
         with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():  # type: ignore[attr-defined]
             gpu.matrix.load_identity()
             gpu.matrix.load_projection_matrix(_pixel_space(region.width, region.height))
             blf.size(0, TEXT_SIZE)
-            blf.color(0, 1.0, 0.6, 0.2, 1.0)
+            blf.color(0, *TEXT_COLOR)
             for number, line in enumerate(lines):
-                blf.position(0, TEXT_SIZE, region.height / 2 - number * 1.5 * TEXT_SIZE, 0)
+                left = (region.width - blf.dimensions(0, line)[0]) / 2
+                blf.position(0, left, region.height / 2 - number * 1.5 * TEXT_SIZE, 0)
                 blf.draw(0, line)
 
 

@@ -56,6 +56,7 @@ class BlenderDevice(Device):
         self._attributeless: dict = {None: _batch(self._attributeless_buffers)}
         self._pixel: Texture | None = None
         self._bound: Any = None
+        self._context = 0
         self._cleared = False
 
     def finish(self) -> None:
@@ -64,6 +65,13 @@ class BlenderDevice(Device):
             self._pixel = self.texture((1, 1), "RGBA8")
         self._pixel.handle.read()
         self._cleared = False
+
+    def context_may_differ(self) -> None:
+        """Say so before work in a timer of Blender's: it runs in the context of whichever window was drawn last.
+
+        On OpenGL all contexts share textures, programs and vertices, but a framebuffer can be bound in its own only.
+        """
+        self._context += 1
 
     def adopt(self, handle: Any) -> Texture:
         """Wrap a 2D texture that Blender made (gpu.texture.from_image) for use as a sampler. Not freed by ``free``."""
@@ -120,12 +128,15 @@ class BlenderDevice(Device):
         texture.handle.clear(format=info.scalar, value=tuple(cast(c) for c in color[: info.channels]))
 
     def _create_target(self, target: Target) -> None:
+        target.handle = self._context, self._framebuffer(target)
+
+    def _framebuffer(self, target: Target) -> Any:
         slots: dict[str, Any] = {}
         if target.colors:
             slots["color_slots"] = tuple(t.handle for t in target.colors)
         if target.depth is not None:
             slots["depth_slot"] = target.depth.handle
-        target.handle = gpu.types.GPUFrameBuffer(**slots)
+        return gpu.types.GPUFrameBuffer(**slots)
 
     def _create_vertices(self, vertices: Vertices, arrays: Mapping[str, np.ndarray]) -> None:
         buffers = []
@@ -191,7 +202,9 @@ class BlenderDevice(Device):
 
     def _begin(self, program: Program, target: Target | None, state: DrawState, viewport: Viewport | None) -> None:
         if target is not None:
-            self._bound = _bound(target.handle)
+            if target.handle[0] != self._context:
+                self._create_target(target)
+            self._bound = _bound(target.handle[1])
             self._bound.__enter__()
             # On OpenGL a framebuffer keeps its viewport from bind to bind, on Vulkan it does not.
             gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))

@@ -1,0 +1,83 @@
+"""F12 in a real window: the interface stays alive, Esc cancels and keeps what there is, a script's render works."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+import numpy as np
+from steps import FAILURES, OUT, check, key, run, say, screenshot, wait_for, window_context
+
+TICKS: list[float] = []
+
+
+def tick() -> float:
+    """Stands for everything else that Blender's interface does."""
+    TICKS.append(time.monotonic())
+    return 0.05
+
+
+def rendering() -> bool:
+    return bpy.app.is_job_running("RENDER")
+
+
+def saved_picture(name: str) -> np.ndarray:
+    """The render result as written to a file: (h, w, 4), row 0 at the bottom."""
+    bpy.data.images["Render Result"].save_render(f"{OUT}/{name}.png")
+    image = bpy.data.images.load(f"{OUT}/{name}.png")
+    pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], 4)
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def press_f12() -> None:
+    with bpy.context.temp_override(**window_context()):
+        bpy.ops.render.render("INVOKE_DEFAULT")
+
+
+def scenario():
+    bpy.app.timers.register(tick)
+    scene = bpy.context.scene
+    scene.render.engine = "REBOUND"
+    scene.render.resolution_x, scene.render.resolution_y = 640, 360
+    scene.rebound.samples = 24
+    bpy.data.objects["Light"].data.energy = 1000
+
+    start = time.monotonic()
+    press_f12()
+    yield from wait_for(lambda: not rendering(), 200)
+    seconds = time.monotonic() - start
+    during = [t for t in TICKS if start < t < start + seconds]
+    pause = max(np.diff([start, *during, start + seconds]))
+    say(f"{seconds:.1f} s, {len(during)} ticks of the interface, longest pause {pause:.2f} s")
+    check("the render ends", not rendering())
+    check("the interface stays alive", len(during) > 2 * seconds and pause < 2)
+    if FAILURES:
+        return
+    whole = saved_picture("f12")
+    check("the picture is there", bool(whole[..., :3].max() > 0.5 and whole[..., :3].std() > 0.05))
+    screenshot("f12_window")
+
+    scene.rebound.samples = 60000
+    start = time.monotonic()
+    press_f12()
+    yield 6.0
+    check("a long render goes on", rendering())
+    screenshot("f12_under_way")
+    key("Escape")
+    yield from wait_for(lambda: not rendering(), 15)
+    check("Esc ends it", not rendering(), f"{time.monotonic() - start:.1f} s")
+    part = saved_picture("f12_cancelled")
+    check("the samples so far are kept", bool(np.abs(part - whole)[..., :3].mean() < 0.02))
+
+    scene.rebound.samples = 2
+    check("a script's render works", bpy.ops.render.render() == {"FINISHED"})
+    check("its picture is there", bool(saved_picture("script")[..., :3].max() > 0.5))
+
+    scene.rebound.samples = 60000
+    press_f12()
+    yield 3.0
+    check("quitting during a render", rendering())
+
+
+run(scenario)
