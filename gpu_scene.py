@@ -42,7 +42,7 @@ class GpuScene:
         self.draws: tuple[Draw, ...] = ()
         self.boxes = np.zeros((1, 2, 3))  # world boxes of all instances, a point at the origin for an empty scene
         self.revision = 0  # grows with every update that changes something
-        self._moved: list[tuple[int, np.ndarray]] = []
+        self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
         self.white = device.texture((1, 1), "RGBA16F", np.ones((1, 1, 4), np.float32))
@@ -51,6 +51,7 @@ class GpuScene:
 
     def update(self, scene: Scene, changes: Changes) -> None:
         """Make the GPU hold ``scene``; only what ``changes`` names is uploaded."""
+        maps_before = _material_uv_maps(self.scene)
         self.scene = scene
         if changes.any:
             self.revision += 1
@@ -60,17 +61,20 @@ class GpuScene:
             self._images[key] = self._upload_image(scene.images[key])
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
-        if changes.geometry or changes.materials or self.instance_table is None:
+        if changes.geometry or self.instance_table is None or maps_before != _material_uv_maps(scene):
             self._place(scene, changes)
         if len(changes.moved_bounds):
-            self._moved.append((self.revision, changes.moved_bounds))
+            self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
             del self._moved[:-64]
 
-    def moved_since(self, revision: int) -> np.ndarray | None:
-        """World boxes (n, 2, 3) where something changed after ``revision``; None: too long ago to tell."""
+    def moved_since(self, revision: int, *, shapes_only: bool = False) -> np.ndarray | None:
+        """World boxes (n, 2, 3) where something changed after ``revision``; None: too long ago to tell.
+
+        ``shapes_only`` leaves out what only looks different.
+        """
         if self._moved and len(self._moved) == 64 and revision < self._moved[0][0]:
             return None
-        boxes = [box for when, box in self._moved if when > revision]
+        boxes = [shapes if shapes_only else moved for when, moved, shapes in self._moved if when > revision]
         return np.concatenate(boxes) if boxes else np.zeros((0, 2, 3))
 
     def textures_of(self, material: int) -> dict[str, Texture]:
@@ -165,3 +169,9 @@ def _uv_maps(material: Material, mesh: Mesh) -> UvMaps:
     """The maps by name; "" where the material has no texture, so that its meshes are kept once."""
     lookups = (material.base_color_texture, material.emission_texture)
     return tuple("" if t is None else t.uv_map or mesh.active_uv for t in lookups)  # type: ignore[return-value]
+
+
+def _material_uv_maps(scene: Scene) -> list[tuple[str | None, ...]]:
+    """All of the materials that decides how meshes are laid out for the GPU."""
+    lookups = ((m.base_color_texture, m.emission_texture) for m in scene.materials)
+    return [tuple(None if t is None else t.uv_map for t in pair) for pair in lookups]

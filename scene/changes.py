@@ -20,7 +20,8 @@ class Changes:
 
     ``moved_bounds`` has one world-space box (lower, upper corner) for every place where the picture of some instance
     may have changed: where a moved, edited, reassigned or recoloured instance was and where it now is, where an
-    added one is, where a removed one was. A light whose map sees none of these boxes keeps its map.
+    added one is, where a removed one was. A light whose map sees none of these boxes keeps its map. ``shape_bounds``
+    has those of them where more than materials changed: what a map of mere shapes depends on.
     """
 
     meshes_added: frozenset[Hashable] = frozenset()
@@ -33,6 +34,7 @@ class Changes:
     world: bool = False
     film: bool = False  # transparency or pixel filter
     moved_bounds: Array = field(default_factory=_no_boxes)  # (n, 2, 3) float64, world space
+    shape_bounds: Array = field(default_factory=_no_boxes)
 
     @property
     def geometry(self) -> bool:
@@ -55,6 +57,7 @@ class Changes:
         first = old is None
         before = Scene(materials=()) if old is None else old
         pairs = tuple(_pair_instances(before, new))
+        moved_bounds, shape_bounds = _moved_bounds(before, new, pairs)
         return cls(
             meshes_added=frozenset(new.meshes.keys() - before.meshes.keys()),
             meshes_removed=frozenset(before.meshes.keys() - new.meshes.keys()),
@@ -65,7 +68,8 @@ class Changes:
             lights=_changed_lights(before, new),
             world=first or before.world != new.world,
             film=first or before.film_transparent != new.film_transparent or before.filter_width != new.filter_width,
-            moved_bounds=_moved_bounds(before, new, pairs),
+            moved_bounds=moved_bounds,
+            shape_bounds=shape_bounds,
         )
 
 
@@ -110,16 +114,22 @@ def _same_light(a: Light, b: Light) -> bool:
     )
 
 
-def _moved_bounds(old: Scene, new: Scene, pairs: tuple[tuple[Instance | None, Instance | None], ...]) -> Array:
-    boxes = []
+def _moved_bounds(
+    old: Scene, new: Scene, pairs: tuple[tuple[Instance | None, Instance | None], ...]
+) -> tuple[Array, Array]:
+    boxes, of_shape = [], []
     for a, b in pairs:
-        if a is not None and b is not None and _same_place(a, b) and _same_look(a, b, old, new):
+        same_shape = a is not None and b is not None and _same_place(a, b)
+        if same_shape and _same_look(a, b, old, new):
             continue
         if a is not None and a.mesh in old.meshes:
             boxes.append(world_bounds(a, old))
+            of_shape.append(not same_shape)
         if b is not None and b.mesh in new.meshes:
             boxes.append(world_bounds(b, new))
-    return np.array(boxes, np.float64).reshape(-1, 2, 3)
+            of_shape.append(not same_shape)
+    moved = np.array(boxes, np.float64).reshape(-1, 2, 3)
+    return moved, moved[np.array(of_shape, bool)]
 
 
 def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:

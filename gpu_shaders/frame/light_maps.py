@@ -45,6 +45,8 @@ class MapTile:
 class LightMaps:
     """Tiles for one kind of map; ``formats`` are its colour textures beside the depth."""
 
+    shows_materials = False  # whether a tile must be drawn again when a material changes that it sees
+
     def __init__(self, device: Device, formats: Sequence[str]) -> None:
         self.device = device
         self.formats = tuple(formats)
@@ -93,7 +95,7 @@ class LightMaps:
         fingerprint, revision = self._drawn.get(tile.key, (b"", -1))
         if fingerprint != tile.fingerprint:
             return True
-        moved = gpu_scene.moved_since(revision)
+        moved = gpu_scene.moved_since(revision, shapes_only=not self.shows_materials)
         return moved is None or bool(tile.face.sees(moved).any())
 
     def viewport(self, tile: MapTile) -> tuple[int, int, int, int]:

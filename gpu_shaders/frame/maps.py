@@ -105,7 +105,7 @@ def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = Non
     bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
     origin = np.asarray(light.world_from_light[:3, 3] if source is None else source, np.float64)
     farthest = np.linalg.norm(np.maximum(abs(bounds[0] - origin), abs(bounds[1] - origin)))
-    far = max(float(farthest) * 1.001, 1e-6)
+    far = _rounded_up(max(float(farthest), 1e-6))
     reach = float(np.abs(bounds).max(initial=0.0)) + float(np.abs(origin).max())
     epsilon = ROUNDING * max(1.0, reach / far)
     if light.kind is LightKind.SPOT and light.spot_angle <= WIDEST_SINGLE_FACE:
@@ -115,6 +115,11 @@ def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = Non
             return (_cube_face("-Z", "", axes, origin, scale, far, epsilon),)
     names = list(_CUBE) if light.kind is LightKind.POINT else list(_CUBE)[:5]
     return tuple(_cube_face(name, name, axes, origin, (1.0, 1.0), far, epsilon) for name in names)
+
+
+def _rounded_up(length: float) -> float:
+    """To the next quarter of an octave: a map is not drawn again because something moved at the scene's far end."""
+    return 2.0 ** (math.ceil(4.0 * math.log2(length * 1.001)) / 4.0)
 
 
 def _cube_face(side, name, axes, origin, scale, far, epsilon) -> Face:

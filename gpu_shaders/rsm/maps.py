@@ -30,6 +30,8 @@ class ReflectiveShadowMaps(LightMaps):
     All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
     """
 
+    shows_materials = True
+
     def __init__(self, device: Device) -> None:
         super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F"])
         self.light_table: Texture | None = None
@@ -96,7 +98,6 @@ class ReflectiveShadowMaps(LightMaps):
             face_tx=self.face_table,
             pc_served=self._served_by(tile),
         )
-
 
     def _served_by(self, tile: MapTile) -> int:
         """Index of the face whose part of the scene this tile leaves to it: a sun's far face has a near one. Or -1."""
