@@ -117,12 +117,7 @@ class _FinalRender:
 
     def _gpu(self, call: Callable[[], T], cancelled: Callable[[], bool] | None = None, patience=NO_ANSWER) -> T:
         """Run a piece of GPU work where the GPU context is."""
-
-        def work() -> T:
-            if not bpy.app.background:
-                self.session.context_may_differ()
-            return call()
-
+        work = call if bpy.app.background else lambda: self.session.in_timer(call)
         return MAIN_THREAD.run(work, cancelled or self.engine.test_break, patience=patience)
 
 

@@ -10,7 +10,7 @@ import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from .scene.changes import Changes
 from .scene.convert import convert_scene
 from .scene.data import Scene, View
 from .settings import Settings, named_settings
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -161,10 +163,17 @@ class Session:
         gpu.upload(self.scene)
         return gpu.renderer.rsm_buffers(gpu.scene, settings)
 
-    def context_may_differ(self) -> None:
-        """To be said before work in a timer of Blender's (BlenderDevice.context_may_differ)."""
+    def in_timer(self, call: Callable[[], T]) -> T:
+        """Do GPU work from a timer of Blender's: in whatever context, and done when this returns.
+
+        Work that was only queued would keep Blender's own drawing waiting, for longer than any timer knows.
+        """
         if self._gpu:
             self._gpu.device.context_may_differ()
+        result = call()
+        if self._gpu:
+            self._gpu.device.finish()
+        return result
 
     def free(self) -> None:
         """Give back all GPU memory; the next picture starts from nothing. Harmless when repeated."""
