@@ -8,7 +8,7 @@
 #   mount --bind /proc TREE/proc; mount --rbind /dev TREE/dev
 #   chroot TREE apt-get install --no-install-recommends blender xvfb xdotool imagemagick libgl1-mesa-dri libegl1 \
 #       libegl-mesa0 libglx-mesa0 libopengl0 mesa-vulkan-drivers python3-numpy python3-cattr python3-requests
-# OUT is a folder for the screenshots. Exit status 0: the scenario printed PASSED and Blender printed no traceback but those it announced.
+# OUT is a folder for the screenshots. Exit status 0: Blender ended well, the scenario printed PASSED and Blender printed no traceback but those it announced.
 set -eu
 tree=$1 scenario=$(realpath "$2") out=$(realpath -m "$3")
 shift 3
@@ -43,7 +43,7 @@ cp "$work/log" "$out/log.txt"
 grep -E '^(>>|rebound:|Traceback|[A-Za-z]*Error)' "$work/log" || true
 tracebacks=$(grep -c '^Traceback' "$work/log" || true)
 expected=$(grep -c '^>> a traceback is expected' "$work/log" || true)
-if ! grep -q '^>> PASSED' "$work/log" || [ "$tracebacks" != "$expected" ]; then
+if [ "$status" != 0 ] || ! grep -q '^>> PASSED' "$work/log" || [ "$tracebacks" != "$expected" ]; then
     echo "run_in_window: failed with status $status; the whole log is $out/log.txt" >&2
     exit 1
 fi

@@ -1,0 +1,217 @@
+"""A viewport without a window: its session draws into an off-screen buffer, as it would into a region."""
+
+from types import SimpleNamespace
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from rebound import engine
+from rebound import viewport as viewport_module
+from rebound.session import SESSIONS, Session
+from rebound.tests.support.engine_build import HEIGHT, WIDTH, rebound_scene
+from rebound.viewport import Viewport
+
+__all__ = ["rebound_scene"]
+
+
+class View:
+    """A viewport with the region that Blender would give it."""
+
+    def __init__(self, scene, width=WIDTH, height=HEIGHT):
+        self.scene = scene
+        self.viewport = Viewport()
+        camera = scene.camera
+        bpy.context.view_layer.update()
+        projection = camera.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=width, y=height)
+        region_data = SimpleNamespace(view_matrix=camera.matrix_world.inverted(), window_matrix=projection)
+        region = SimpleNamespace(width=width, height=height)
+        self.context = SimpleNamespace(region=region, region_data=region_data, space_data=None)
+
+    def update(self):
+        # Local view is asked of a real 3D viewport, which there is none of in background.
+        self.viewport.session.sync(bpy.context.evaluated_depsgraph_get(), for_viewport=True)
+        self.viewport.error, self.viewport._failed_for, self.viewport._synced = "", None, True
+
+    def draw(self):
+        """One redraw; the pixels of the region, row 0 at the bottom."""
+        region = self.context.region
+        target = gpu.types.GPUOffScreen(region.width, region.height, format="RGBA32F")
+        with target.bind():
+            framebuffer = gpu.state.active_framebuffer_get()
+            framebuffer.clear(color=(0, 0, 0, 0))
+            with engine._boundary(self.viewport.fail):
+                self.viewport.draw(self.context, bpy.context.evaluated_depsgraph_get())
+            buffer = framebuffer.read_color(0, 0, region.width, region.height, 4, 0, "FLOAT")
+        buffer.dimensions = region.width * region.height * 4
+        pixels = np.array(buffer, np.float32).reshape(region.height, region.width, 4)
+        target.free()
+        return pixels
+
+    def finish(self):
+        """Redraw until the picture is finished; the last pixels."""
+        for _ in range(200):
+            pixels = self.draw()
+            if not self.viewport.unfinished:
+                return pixels
+        raise AssertionError("the viewport never finishes")
+
+    @property
+    def picture(self):
+        return self.viewport.session._picture
+
+
+@pytest.fixture
+def view(rebound_scene):
+    rebound_scene.rebound.viewport_samples = 3
+    rebound_scene.rebound.viewport_shadow_resolution = 128
+    rebound_scene.rebound.viewport_rsm_resolution = 32
+    made = View(rebound_scene)
+    made.update()
+    yield made
+    made.viewport.session.free()
+
+
+def test_viewport_converges_and_stops(view):
+    pixels = view.finish()
+    assert view.picture.samples == 3
+    assert view.viewport.progress == "Sample 3/3"
+    assert pixels[..., 0].max() > 0.1 and (pixels[..., 3] == 1).all()
+    np.testing.assert_array_equal(view.draw(), pixels)
+    assert view.picture.samples == 3
+
+
+def test_viewport_shows_what_it_accumulated(view):
+    pixels = view.finish()
+    np.testing.assert_allclose(pixels, view.picture.read("combined"), rtol=1e-5, atol=1e-6)
+
+
+def test_orbit_uploads_nothing_and_starts_anew(view):
+    view.finish()
+    uploads, first = dict(view.viewport.session._gpu.scene.uploads), view.picture
+    view.context.region_data.view_matrix = view.context.region_data.view_matrix @ Matrix.Rotation(0.1, 4, "Z")
+    view.draw()
+    assert view.picture is not first and view.picture.samples == 1
+    assert dict(view.viewport.session._gpu.scene.uploads) == uploads
+
+
+def test_update_without_a_change_goes_on(view):
+    view.finish()
+    first = view.picture
+    view.update()
+    view.draw()
+    assert view.picture is first
+
+
+def test_moved_light_uploads_no_mesh(view):
+    view.finish()
+    before = view.viewport.session._gpu.scene.uploads["meshes"]
+    bpy.data.objects["Spot"].location.x = -1
+    view.update()
+    assert view.draw()[..., 0].max() > 0.1
+    assert view.picture.samples == 1
+    assert view.viewport.session._gpu.scene.uploads["meshes"] == before
+
+
+def test_changed_setting_starts_anew_without_an_update(view):
+    view.finish()
+    view.scene.rebound.method = "NONE"
+    view.draw()
+    assert view.picture.samples == 1
+
+
+def test_more_samples_start_anew_and_finish(view):
+    view.finish()
+    view.scene.rebound.viewport_samples = 5
+    view.finish()
+    assert view.picture.samples == 5
+
+
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (129, 65)])
+def test_resized_region_gets_a_picture_of_its_size(view, size):
+    view.finish()
+    view.context.region.width, view.context.region.height = size
+    assert view.finish().shape == (size[1], size[0], 4)
+
+
+def test_film_transparent_shows_through(view):
+    view.scene.render.film_transparent = True
+    bpy.data.objects["Floor"].hide_viewport = True
+    view.update()
+    assert view.finish()[..., 3].min() == 0
+
+
+def test_own_fault_is_shown_once_and_tried_again_after_an_edit(view, monkeypatch, caplog):
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "picture", lambda *_: 1 / 0)
+        view.draw()
+        view.draw()
+        assert "ZeroDivisionError" in view.viewport.error
+        assert not view.viewport.unfinished
+        assert len([r for r in caplog.records if r.exc_info]) == 1, "an error is no reason to fill the console"
+    view.draw()
+    assert "ZeroDivisionError" in view.viewport.error, "the same is not tried again"
+    view.update()
+    assert view.finish()[..., 0].max() > 0.1
+    assert not view.viewport.error
+
+
+def test_other_settings_are_a_reason_to_try_again(view, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "picture", lambda *_: 1 / 0)
+        view.draw()
+    view.scene.rebound.method = "NONE"
+    assert view.finish()[..., 0].max() > 0.1
+
+
+def test_fault_gives_the_memory_back(view, monkeypatch):
+    view.finish()
+    monkeypatch.setattr("rebound.session.Picture.advance", lambda *_: 1 / 0)
+    view.scene.rebound.method = "NONE"
+    view.draw()
+    assert view.viewport.error and view.viewport.session._gpu is None
+
+
+def test_error_is_drawn_as_text(view):
+    view.context.region.width, view.context.region.height = 400, 100
+    view.viewport.fail("something is wrong")
+    target = gpu.types.GPUOffScreen(400, 100, format="RGBA32F")
+    with target.bind():
+        framebuffer = gpu.state.active_framebuffer_get()
+        framebuffer.clear(color=(0, 0, 0, 0))
+        view.viewport.draw_error(view.context)
+        buffer = framebuffer.read_color(0, 0, 400, 100, 4, 0, "FLOAT")
+    buffer.dimensions = 400 * 100 * 4
+    assert (np.array(buffer) > 0.5).sum() > 50
+    target.free()
+
+
+def test_settings_are_the_viewports_own(view):
+    view.scene.rebound.samples = 99
+    view.finish()
+    assert view.picture.settings["samples"] == 3
+
+
+def test_free_all_frees_every_viewport(view):
+    view.finish()
+    SESSIONS.free_all()
+    assert view.viewport.session._gpu is None
+    assert view.finish()[..., 0].max() > 0.1, "and it starts again by itself"
+
+
+def test_draw_before_the_first_update_draws_nothing(rebound_scene):
+    made = View(rebound_scene)
+    assert made.draw().max() == 0 and not made.viewport.error
+
+
+def test_time_for_one_redraw_is_bounded(view, monkeypatch):
+    """A sample that takes long is continued with the next redraw, once there is a picture."""
+    view.finish()
+    view.scene.rebound.viewport_samples = 4
+    view.draw()
+    monkeypatch.setattr(viewport_module, "SECONDS_PER_DRAW", 0.0)
+    before = view.picture.samples
+    view.draw()
+    assert view.picture.samples == before
