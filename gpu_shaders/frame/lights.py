@@ -46,7 +46,7 @@ def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.nda
     Abel transform, proportional to 1 / sqrt(R² - r²).
     """
     flat = light.kind in (LightKind.SUN, LightKind.AREA)
-    u = _net_point(index, count_offset) if flat else (count_offset + _R3 * index) % 1.0
+    u = np.array(_net_point(index, count_offset)) if flat else (count_offset + _R3 * index) % 1.0
     center = np.asarray(light.world_from_light, np.float64)[:3, 3]
     axes = light_axes(light)
     if light.kind is LightKind.SUN:

@@ -4,12 +4,13 @@
 const int IMAGE_CLOSEST = 1;
 const int IMAGE_EXTEND = 2;
 
+/* `texel` is at least -size. */
 ivec2 image_wrap(ivec2 texel, ivec2 size, int mode)
 {
   if ((mode & IMAGE_EXTEND) != 0) {
     return clamp(texel, ivec2(0), size - 1);
   }
-  return ivec2(mod(vec2(texel), vec2(size)));
+  return (texel + size) % size;
 }
 
 vec4 image_sample(sampler2D image_tx, vec2 uv, int mode)
