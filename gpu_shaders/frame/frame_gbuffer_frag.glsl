@@ -14,8 +14,8 @@ void main()
     out_emission = vec4(0.0);
     return;
   }
-  Surface surface = surface_evaluate(
-      material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv);
+  Surface surface =
+      surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv);
   out_albedo = vec4(surface.albedo, 1.0);
   out_emission = vec4(surface.emission, 1.0);
 }

@@ -7,8 +7,7 @@ void main()
   if (pc_perspective != 0) {
     closeness = pc_far * gl_FragCoord.w;
     depth = 1.0 / closeness;
-  }
-  else {
+  } else {
     depth = 0.5 * v_depth + 0.5;
     closeness = -depth;
   }

@@ -75,8 +75,8 @@ float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
 
 /* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter.
  * `radius` is the emitter's radius in metres, for a sun the tangent of half its angle. */
-float shadow_soft(
-    MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, float radius, vec2 noise)
+float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, float radius,
+                  vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
   float per_metre = 0.5 * max(face.scale.x, face.scale.y);
@@ -97,9 +97,9 @@ float shadow_soft(
     return 1.0;
   }
   blocker /= blockers;
-  float width = per_metre * radius *
-                (face.perspective != 0 ? (blocker - receiver.closeness) / face.far :
-                                         (blocker - receiver.closeness) * face.far);
+  float width =
+      per_metre * radius *
+      (face.perspective != 0 ? (blocker - receiver.closeness) / face.far : (blocker - receiver.closeness) * face.far);
   width = clamp(width, 0.5 / face.tile, SHADOW_WIDEST_SEARCH);
   float lit = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {

@@ -20,8 +20,8 @@ struct Gather {
   vec3 P;
   vec3 N;
   int face; /* the face that looks the receiver's way */
-  vec2
-      place; /* the receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold */
+  /* The receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold. */
+  vec2 place;
 };
 
 vec3 gather_fetch(Gather g, int face_index, vec2 uv)
