@@ -150,12 +150,19 @@ class Session:
         old = self._picture
         if old and not changed and old.is_for(view, settings):
             return old
-        self._picture = None
-        if old:
-            old.free()
-        frame = gpu.renderer.begin(view, settings)
+        frame = self._empty_frame(gpu, view, settings)
         self._picture = Picture(gpu.device, gpu.scene, gpu.renderer, frame, view, settings, self.status)
         return self._picture
+
+    def _empty_frame(self, gpu: _Gpu, view: View, settings: Settings) -> Frame:
+        """The last picture's frame, emptied, if it has the right size; else a new one."""
+        old, self._picture = self._picture, None
+        if old and (old.frame.width, old.frame.height) == (view.width, view.height):
+            gpu.renderer.restart(old.frame)
+            return old.frame
+        if old:
+            old.free()
+        return gpu.renderer.begin(view, settings)
 
     def rsm_buffers(self, settings: Settings) -> list[RsmBuffers]:
         """Every light's reflective shadow map, for the scene of the last sync."""
