@@ -44,6 +44,8 @@ class HeadlessDevice(Device):
         self.max_texture_size = min(16384, ctx.info["GL_MAX_TEXTURE_SIZE"])
         self._programs: dict[Shader, Program] = {}
         self._attributeless: dict[Program, Any] = {}
+        # Bound between draws: a framebuffer that is freed while it is bound makes every later one an OpenGL error.
+        self._idle = ctx.framebuffer([ctx.renderbuffer((1, 1))])
 
     @property
     def error(self) -> str:
@@ -169,6 +171,7 @@ class HeadlessDevice(Device):
         assert target is not None
         self._ctx.enable_only(moderngl.NOTHING)
         target.handle.depth_mask = True  # a clear respects it
+        self._idle.use()
         if binding.touches_images(program.shader):
             self._ctx.memory_barrier()
 

@@ -33,7 +33,10 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   if (light.face_count == 2 && !map_holds(face, map_position(face, P))) {
     face = map_face_fetch(face_tx, light.first_face + 1);
   }
-  if (!map_holds(face, map_position(face, P))) {
+  /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
+  bool spot = light.kind == LIGHT_SPOT && light.blur_radius > 0.0 && light.face_count == 1;
+  vec3 p = map_position(face, P);
+  if (!map_holds(face, p) && !(spot && p.z > face.near)) {
     return 1.0;
   }
   if (light.filtered != 0 && light.blur_radius > 0.0) {

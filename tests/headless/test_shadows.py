@@ -198,6 +198,18 @@ def test_shadow_begins_at_the_contact(studio, name):
     assert (specks, leaks) == (0, 0)
 
 
+@pytest.mark.parametrize("mode", ["SAMPLED", "FILTERED"])
+def test_sized_spot_leaks_nowhere_at_the_edge_of_its_cone(studio, mode):
+    """Points of the emitter reach beyond the cone of its centre, from which the filtered map was drawn."""
+    lamp = light("SPOT", (0, 0, 2.5), spot_angle=50 * DEGREES, radius=0.3)
+    meshes = [GROUND, quad("blocker", (0, 0, 0.5), (2.5, 0, 0), (0, 2.5, 0))]
+    view = ortho(32, 32, 4)
+    visibility = {"blocker": Visibility.SHADOW}
+    values = {"method": "NONE", "soft_shadows": mode, "shadow_resolution": RESOLUTION}
+    found = studio.render(scene(meshes, [lamp], visibility=visibility), view, 8, ["diffuse_direct"], **values)
+    assert not found["diffuse_direct"].any()
+
+
 # --- penumbrae -------------------------------------------------------------------------------------------------------
 
 

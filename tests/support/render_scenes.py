@@ -213,6 +213,7 @@ class Studio:
             self.renderer.free_frame(frame)
 
     def free(self) -> None:
-        """Give back everything."""
+        """Give back everything; OpenGL must have had nothing to complain of."""
         self.renderer.free()
         self.gpu_scene.free()
+        assert self.device.error == "GL_NO_ERROR"

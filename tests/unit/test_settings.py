@@ -25,7 +25,7 @@ def test_setting_describes_itself(name):
     if setting.kind == "BOOL":
         assert all(isinstance(value, bool) for value in defaults)
         return
-    assert all(setting.minimum <= value <= setting.maximum for value in defaults)
+    assert all(setting.minimum <= float(value) <= setting.maximum for value in defaults)
     assert setting.minimum < setting.maximum
     number = int if setting.kind == "INT" else (int, float)
     assert all(isinstance(value, number) and not isinstance(value, bool) for value in (*defaults, setting.minimum))
