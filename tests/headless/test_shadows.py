@@ -198,6 +198,19 @@ def test_shadow_begins_at_the_contact(studio, name):
     assert (specks, leaks) == (0, 0)
 
 
+@pytest.mark.parametrize("place", [(0.13, 0.31, 0.15), (0, 0, 0.1), (0.7, 0.2, 0.1), (0.2, 0, 0.02)], ids=str)
+def test_lamp_just_above_a_floor_leaves_it_lit(studio, place):
+    """The floor passes below the lamp and behind it: its triangles are cut where depth is known least."""
+    lamp = light("POINT", place, (*place[:2], 0))
+    lights = [lamp, replace(lamp, casts_shadow=False)]
+    view = ortho(96, 96, 5)
+    values = {"method": "NONE", "shadow_resolution": RESOLUTION}
+    found, full = (
+        studio.render(scene([GROUND], [one]), view, 2, ["diffuse_direct"], **values)["diffuse_direct"] for one in lights
+    )
+    np.testing.assert_allclose(found, full, rtol=1e-5)
+
+
 @pytest.mark.parametrize("mode", ["SAMPLED", "FILTERED"])
 def test_sized_spot_leaks_nowhere_at_the_edge_of_its_cone(studio, mode):
     """Points of the emitter reach beyond the cone of its centre, from which the filtered map was drawn."""
