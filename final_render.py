@@ -17,7 +17,7 @@ from .render_result import add_passes, fill, wanted_passes
 from .renderer import RenderError
 from .scene.cameras import active_camera, border_pixels, camera_view
 from .scene.data import View
-from .session import Picture, Session, read_settings
+from .session import SESSIONS, Picture, Session, read_settings
 from .settings import Settings
 
 T = TypeVar("T")
@@ -59,8 +59,8 @@ class _FinalRender:
     def run(self) -> None:
         self.engine.update_stats("", "Reading the scene")
         self.session.sync(self.depsgraph, for_viewport=False)
-        for line in self.session.status.warnings:
-            self.engine.report({"WARNING"}, line)
+        if not self.engine.is_preview:  # whose scene is Blender's, not the user's
+            self._announce()
         view = _view(self.engine, self.depsgraph)
         try:
             picture = self._gpu(lambda: self.session.picture(view, self.settings))
@@ -69,6 +69,11 @@ class _FinalRender:
                 self._finish(picture, result)
         except Cancelled:
             LOGGER.info("cancelled before the first sample")
+
+    def _announce(self) -> None:
+        SESSIONS.newest = self.session.status
+        for line in self.session.status.warnings:
+            self.engine.report({"WARNING"}, line)
 
     def _accumulate(self, picture: Picture, result) -> None:
         """Add sample after sample until there are enough or the user cancels."""

@@ -138,7 +138,6 @@ class Session:
         self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, visible=visible)
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
         self.status.error = ""
-        SESSIONS.newest = self.status
 
     def picture(self, view: View, settings: Settings) -> Picture:
         """Bring the GPU up to date; the last picture if scene, view and settings are still the same, else an empty one.

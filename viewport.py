@@ -9,7 +9,7 @@ import gpu
 from mathutils import Matrix
 
 from .scene.cameras import region_view
-from .session import Session, read_settings
+from .session import SESSIONS, Session, read_settings
 from .settings import Settings
 
 # Seconds of work between two redraws once there is a picture; navigation waits no longer than this.
@@ -33,6 +33,7 @@ class Viewport:
         """Blender's data changed. CPU work only."""
         space = context.space_data
         self.error, self._failed_for, self._synced = "", None, False
+        SESSIONS.newest = self.session.status
         self.session.sync(depsgraph, for_viewport=True, visible=lambda obj: obj.visible_in_viewport_get(space))
         self._synced = True
 

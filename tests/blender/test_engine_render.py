@@ -11,7 +11,7 @@ from rebound import engine as engine_module
 from rebound.passes import PASSES
 from rebound.render_result import view_layer_property
 from rebound.session import SESSIONS
-from rebound.tests.support.engine_build import HEIGHT, WIDTH, picture, rebound_scene, render
+from rebound.tests.support.engine_build import HEIGHT, WIDTH, channels, picture, rebound_scene, render
 
 __all__ = ["rebound_scene"]
 
@@ -58,18 +58,18 @@ def test_only_wanted_passes_are_in_the_file(rebound_scene, tmp_path):
 def test_every_pass_is_filled(rebound_scene, tmp_path):
     for entry in PASSES:
         setattr(rebound_scene.view_layers[0], view_layer_property(entry), True)
-    channels = render(rebound_scene, tmp_path / "a.exr")
-    assert {name.split(".")[1] for name in channels} == set(NAMES)
-    assert all(np.isfinite(pixels).all() for pixels in channels.values())
+    found = render(rebound_scene, tmp_path / "a.exr")
+    assert {name.split(".")[1] for name in found} == set(NAMES)
+    assert all(np.isfinite(pixels).all() for pixels in found.values())
 
     def rgb(key):
         name = NAMES[[p.key for p in PASSES].index(key)]
-        return np.stack([channels[f"ViewLayer.{name}.{c}"] for c in "RGB"], axis=-1)
+        return np.stack([found[f"ViewLayer.{name}.{c}"] for c in "RGB"], axis=-1)
 
     light = rgb("diffuse_direct") + rgb("diffuse_indirect")
     sum_of_passes = rgb("diffuse_color") * light + rgb("emission") + rgb("environment")
     # The passes and Combined are read from sums of their own; what is left is their rounding.
-    np.testing.assert_allclose(sum_of_passes, picture(channels)[..., :3], atol=1e-4, rtol=1e-4)
+    np.testing.assert_allclose(sum_of_passes, picture(found)[..., :3], atol=1e-4, rtol=1e-4)
     assert light.max() > 0.1 and rgb("diffuse_indirect").max() > 1e-3
 
 
@@ -93,8 +93,8 @@ def test_two_view_layers_render_their_own_objects(rebound_scene, tmp_path):
     rebound_scene.collection.objects.unlink(box)
     hidden.objects.link(box)
     second.layer_collection.children["Hidden"].exclude = True
-    channels = render(rebound_scene, tmp_path / "a.exr")
-    first, other = picture(channels), picture(channels, "Second")
+    found = render(rebound_scene, tmp_path / "a.exr")
+    first, other = picture(found), picture(found, "Second")
     white = np.abs(first[..., 0] - first[..., 1]) < 0.1 * first[..., 0]
     red = other[..., 0] > 2 * other[..., 1]
     assert (white & red).sum() > 50, "the floor shows where the box was"
@@ -127,6 +127,28 @@ def test_transparent_film_has_no_background(rebound_scene, tmp_path):
     rebound_scene.render.film_transparent = True
     alpha = picture(render(rebound_scene, tmp_path / "a.exr"))[..., 3]
     assert alpha.min() == 0.0 and alpha.max() == 1.0
+
+
+def test_frame_alone_equals_the_frame_of_an_animation(rebound_scene, tmp_path):
+    box = bpy.data.objects["Box"]
+    for frame, x in ((1, -1), (3, 1)):
+        box.location.x = x
+        box.keyframe_insert("location", frame=frame)
+    rebound_scene.frame_set(2)
+    alone = picture(render(rebound_scene, tmp_path / "alone.exr"))
+    rebound_scene.frame_start, rebound_scene.frame_end = 1, 2
+    rebound_scene.render.filepath = str(tmp_path / "film_")
+    assert bpy.ops.render.render(animation=True) == {"FINISHED"}
+    first, second = (picture(channels(tmp_path / f"film_000{n}.exr")) for n in (1, 2))
+    np.testing.assert_array_equal(second, alone)
+    assert np.abs(first - second).max() > 0.05
+
+
+def test_warnings_are_kept_for_the_panel(rebound_scene, tmp_path):
+    bpy.data.objects.remove(bpy.data.objects["Spot"])
+    render(rebound_scene, tmp_path / "a.exr")
+    assert any("no light" in line for line in SESSIONS.newest.warnings)
+    assert SESSIONS.newest.samples == 1 and "triangles" in SESSIONS.newest.statistics
 
 
 def test_progress_is_logged(rebound_scene, tmp_path, caplog):

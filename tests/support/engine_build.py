@@ -50,10 +50,15 @@ def render(scene, path) -> dict[str, np.ndarray]:
     settings.color_depth = "32"
     scene.render.filepath = str(path)
     assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+    return channels(path)
+
+
+def channels(path) -> dict[str, np.ndarray]:
+    """The channels of an EXR file by name, row 0 at the top."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return {name: channel.pixels.copy() for part in file.parts for name, channel in part.channels.items()}
 
 
-def picture(channels: dict[str, np.ndarray], layer: str = "ViewLayer") -> np.ndarray:
+def picture(found: dict[str, np.ndarray], layer: str = "ViewLayer") -> np.ndarray:
     """The combined picture of ``render``: (h, w, 4)."""
-    return np.stack([channels[f"{layer}.Combined.{c}"] for c in "RGBA"], axis=-1)
+    return np.stack([found[f"{layer}.Combined.{c}"] for c in "RGBA"], axis=-1)

@@ -1,0 +1,86 @@
+"""Every tab of the Properties editor with Rebound in a real window, a material's preview, and an error of F12's."""
+
+from __future__ import annotations
+
+import bpy
+from steps import check, run, screenshot, wait_for, window_context
+
+from rebound import final_render
+from rebound.ui import panels
+
+TABS = ("RENDER", "OUTPUT", "VIEW_LAYER", "SCENE", "WORLD", "OBJECT", "DATA", "MATERIAL")
+PREVIEWS: list[tuple[int, int]] = []
+
+
+def note_previews() -> None:
+    """Note the size of every preview picture that is rendered."""
+    view = final_render._view
+
+    def noted(engine, depsgraph):
+        if engine.is_preview:
+            PREVIEWS.append((engine.resolution_x, engine.resolution_y))
+        return view(engine, depsgraph)
+
+    final_render._view = noted
+
+
+def select(name: str) -> None:
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == name)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+
+
+def open_all_panels() -> None:
+    """As if the user had opened every panel: what is closed is not drawn, and would hide a fault."""
+    for panel in panels.CLASSES:
+        if "DEFAULT_CLOSED" in getattr(panel, "bl_options", ()):
+            bpy.utils.unregister_class(panel)
+            panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"}
+            bpy.utils.register_class(panel)
+
+
+def scenario():
+    scene = bpy.context.scene
+    scene.render.engine = "REBOUND"
+    note_previews()
+    open_all_panels()
+    window = window_context()["window"]
+    # The 3D viewport becomes a second, large Properties editor.
+    area = window_context()["area"]
+    area.type = "PROPERTIES"
+    space = area.spaces.active
+    for name in ("Cube", "Light", "Camera"):
+        select(name)
+        for tab in TABS if name == "Cube" else ("DATA", "OBJECT"):
+            yield 0.5
+            try:
+                space.context = tab
+            except TypeError:  # this object has no such tab
+                continue
+            yield 1.0
+            screenshot(f"tab_{name.lower()}_{tab.lower()}")
+    select("Cube")
+    yield 0.5
+    space.context = "MATERIAL"
+    yield from wait_for(lambda: bool(PREVIEWS), 30)
+    check("the material's preview is rendered with Rebound", bool(PREVIEWS), PREVIEWS[:3])
+    yield 3.0
+    screenshot("material_tab")
+    scene.camera.scale = (0, 0, 0)
+    yield from press_f12(window, area)
+    check("a failed render ends", not bpy.app.is_job_running("RENDER"))
+    screenshot("f12_error")
+    bpy.data.objects.remove(scene.camera)
+    yield from press_f12(window, area)
+    check("a render without camera ends", not bpy.app.is_job_running("RENDER"))
+    screenshot("f12_no_camera")
+
+
+def press_f12(window, area):
+    with bpy.context.temp_override(window=window, area=area):
+        bpy.ops.render.render("INVOKE_DEFAULT")
+    yield from wait_for(lambda: not bpy.app.is_job_running("RENDER"), 20)
+    yield 1.0
+
+
+run(scenario)
