@@ -41,10 +41,14 @@ def write_layers(path: Path, layers: Mapping[str, Layer]) -> None:
     by_size: dict[tuple[int, int], dict[str, np.ndarray]] = {}
     for name, layer in layers.items():
         by_size.setdefault(layer.pixels.shape[:2], {}).update(_channels(name, layer))
-    parts = [
-        OpenEXR.Part({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels, f"{w} x {h}")
-        for (h, w), channels in by_size.items()
-    ]
+    # The parts of a file have one display window.
+    corner = np.max(list(by_size), axis=0)[::-1].astype(np.int32) - 1
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "displayWindow": (np.zeros(2, np.int32), corner),
+    }
+    parts = [OpenEXR.Part(dict(header), channels, f"{w} x {h}") for (h, w), channels in by_size.items()]
     try:
         OpenEXR.File(parts).write(str(path))
     except (OSError, RuntimeError) as error:

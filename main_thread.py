@@ -8,6 +8,7 @@ work here, a timer on the main thread runs it, and between two pieces Blender dr
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
@@ -18,6 +19,7 @@ from typing import TypeVar
 import bpy
 
 T = TypeVar("T")
+LOGGER = logging.getLogger("rebound")
 
 IDLE_INTERVAL = 0.1  # seconds between two looks at an empty queue: how long the first piece of a render may wait
 BUSY_INTERVAL = 0.002  # seconds between two ticks of a running render: time for Blender's own events
@@ -64,11 +66,11 @@ class MainThread:
         if threading.current_thread() is threading.main_thread():
             call()
         else:
-            self._put(call)
+            self.later(call)
 
     def later(self, call: Callable[[], object]) -> None:
         """Run ``call`` from the timer, when the main thread is sure to have its GPU context."""
-        self._put(call)
+        self._put(call).add_done_callback(_log_error)
 
     def _put(self, call: Callable[[], object]) -> Future:
         future: Future = Future()
@@ -86,6 +88,13 @@ class MainThread:
             _complete(future, call)
             self._newest_job = time.monotonic()
         return BUSY_INTERVAL if time.monotonic() - self._newest_job < BUSY_AFTER_JOB else IDLE_INTERVAL
+
+
+def _log_error(future: Future) -> None:
+    """For work that nobody waits for."""
+    error = None if future.cancelled() else future.exception()
+    if error is not None:
+        LOGGER.error("internal error", exc_info=error)
 
 
 def _complete(future: Future, call: Callable[[], object]) -> None:

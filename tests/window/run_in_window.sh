@@ -8,7 +8,8 @@
 #   mount --bind /proc TREE/proc; mount --rbind /dev TREE/dev
 #   chroot TREE apt-get install --no-install-recommends blender xvfb xdotool imagemagick libgl1-mesa-dri libegl1 \
 #       libegl-mesa0 libglx-mesa0 libopengl0 mesa-vulkan-drivers python3-numpy python3-cattr python3-requests
-# OUT is a folder for the screenshots. Exit status 0: Blender ended well, the scenario printed PASSED and Blender printed no traceback but those it announced.
+# OUT is a folder for the screenshots. Exit status 0: Blender ended well, the scenario printed PASSED, and Blender
+# printed no traceback but those that the scenario announced.
 set -eu
 tree=$1 scenario=$(realpath "$2") out=$(realpath -m "$3")
 shift 3

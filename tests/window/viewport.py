@@ -82,6 +82,7 @@ def scenario():
     yield from wait_for(lambda: samples() >= 12, 60)
     check("orbiting starts a new picture", samples() == 12)
 
+    yield from local_view()
     yield from errors(scene, space)
 
     space.shading.type = "SOLID"
@@ -93,6 +94,25 @@ def scenario():
     space.shading.type = "RENDERED"
     yield from wait_for(lambda: samples() >= 12, 60)
     check("rendered again after other modes", samples() == 12)
+
+
+def local_view():
+    """What local view hides is not drawn."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == "Cube")
+    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    before = viewport_picture("before_local_view")
+    with bpy.context.temp_override(**window_context()):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 1.0
+    yield from wait_for(lambda: samples() >= 12, 60)
+    inside = viewport_picture("local_view")
+    dark = [(picture.max(axis=-1) < 0.05).mean() for picture in (before, inside)]
+    check("local view hides the rest", bool(dark[1] < dark[0] - 0.02), *np.round(dark, 3))
+    with bpy.context.temp_override(**window_context()):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 1.0
+    yield from wait_for(lambda: samples() >= 12, 60)
 
 
 def errors(scene, space):
