@@ -25,7 +25,7 @@ PICTURES = {
     "sunlit_room_direct": ("basic/sunlit_room", {"method": "NONE"}, (480, 480), 1.0),
     "many_lights": ("basic/many_lights", {}, (640, 360), 0.0),
     "classroom": ("classroom/classroom", {"samples": 128}, (640, 360), 1.0),
-    "kitchen": ("kitchen/kitchen", {"soft_shadows": "FILTERED"}, (640, 360), 0.0),
+    "kitchen": ("kitchen/kitchen", {}, (640, 360), 0.0),
     "wooden_staircase": ("wooden_staircase/wooden_staircase", {"soft_shadows": "FILTERED"}, (360, 640), 0.0),
 }
 
