@@ -83,10 +83,20 @@ class Face:
 
 
 def light_axes(light: Light) -> np.ndarray:
-    """(3, 3) unit columns: the light's own X, Y, Z in the world."""
-    axes = np.asarray(light.world_from_light, np.float64)[:3, :3]
-    lengths = np.linalg.norm(axes, axis=0)
-    return axes / np.where(lengths > 0, lengths, 1.0)
+    """(3, 3) unit columns at right angles: the light's own Z in the world, its X and Y as near as a shear lets them.
+
+    A mirrored light keeps its mirrored frame.
+    """
+    x, y, z = np.asarray(light.world_from_light, np.float64)[:3, :3].T
+    z = _unit(z, np.array((0.0, 0.0, 1.0)))
+    x = _unit(x - z * (x @ z), _any_perpendicular(z))
+    y = _unit(y - z * (y @ z) - x * (y @ x), np.cross(z, x))
+    return np.stack([x, y, z], axis=1)
+
+
+def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(v)
+    return v / length if length > 1e-12 else otherwise
 
 
 def spot_stretch(light: Light) -> tuple[float, float]:
@@ -138,17 +148,12 @@ def _looking(origin, forward, up) -> np.ndarray:
 
 def _sun_faces(axes, boxes, to_sun) -> tuple[Face, ...]:
     """Orthographic, as small as the scene seen along the light allows; the view has no part in it."""
-    forward = -np.asarray(to_sun, np.float64)
-    up = axes[:, 1] - forward * (axes[:, 1] @ forward)
-    length = np.linalg.norm(up)
-    up = up / length if length > 1e-6 else _any_perpendicular(forward)
-    rows = np.stack([np.cross(forward, up), up, forward])
-    centers = boxes.mean(1) @ rows.T
-    halves = 0.5 * (boxes[:, 1] - boxes[:, 0]) @ np.abs(rows).T
-    lower, upper = centers - halves, centers + halves
+    rows = _sun_rows(axes, np.asarray(to_sun, np.float64))
+    lower, upper = _seen_along(rows, boxes)
     everything = lower.min(0), upper.max(0)
     reach = float(np.abs(boxes).max())
-    kept = _without_huge(lower, upper)
+    # Asked of the sun's own direction, so that all samples of its disc have the same number of faces.
+    kept = _without_huge(*_seen_along(_sun_rows(axes, axes[:, 2]), boxes))
     if kept is None:
         return (_sun_face(rows, *everything, reach, ""),)
     # The narrow picture keeps the whole depth: what blocks the light may be huge.
@@ -157,6 +162,21 @@ def _sun_faces(axes, boxes, to_sun) -> tuple[Face, ...]:
     low, high = np.maximum(low - margin, everything[0]), np.minimum(high + margin, everything[1])
     low[2], high[2] = everything[0][2], everything[1][2]
     return _sun_face(rows, low, high, reach, "Near"), _sun_face(rows, *everything, reach, "Far")
+
+
+def _sun_rows(axes, to_sun) -> np.ndarray:
+    """(3, 3) rotation into the frame of a sun's face: right, up, away from the sun."""
+    forward = -to_sun
+    up = axes[:, 1] - forward * (axes[:, 1] @ forward)
+    up = _unit(up, _any_perpendicular(forward))
+    return np.stack([np.cross(forward, up), up, forward])
+
+
+def _seen_along(rows, boxes) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners, (n, 3) each, of the boxes in the frame of ``rows``."""
+    centers = boxes.mean(1) @ rows.T
+    halves = 0.5 * (boxes[:, 1] - boxes[:, 0]) @ np.abs(rows).T
+    return centers - halves, centers + halves
 
 
 def _without_huge(lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:

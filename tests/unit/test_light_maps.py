@@ -1,5 +1,6 @@
 """What lights look through, where on the emitter they look from, and which map lies where: numpy only."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from rebound.gpu_shaders.frame.light_maps import LightMaps, MapTile
 from rebound.gpu_shaders.frame.lights import emitter_sample
-from rebound.gpu_shaders.frame.maps import Atlas, light_faces
+from rebound.gpu_shaders.frame.maps import Atlas, light_axes, light_faces
 from rebound.tests.support.render_scenes import light
 
 RNG = np.random.default_rng(2)
@@ -279,3 +280,19 @@ def test_cancelled_drawing_leaves_the_rest_stale():
     assert [tile.owner for tile in maps.stale(FakeScene(2, [(2, under_a)]))] == ["a"]
     # Cancelled before it was drawn: it still is out of date, though the scene did not change again.
     assert draw(maps, FakeScene(2, [(2, under_a)])) == "a"
+
+
+def test_sheared_light_has_axes_at_right_angles_and_keeps_its_direction():
+    sheared = np.eye(4)
+    sheared[:3, :3] = [[1.0, 0.5, 0.3], [0.0, 2.0, 0.2], [0.0, 0.0, -0.7]]
+    axes = light_axes(dataclasses.replace(light("AREA", (0, 0, 0), (0, 0, -1)), world_from_light=sheared))
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(axes[:, 2], sheared[:3, 2] / np.linalg.norm(sheared[:3, 2]), atol=1e-12)
+    assert np.linalg.det(axes) < 0, "mirrored stays mirrored"
+
+
+def test_samples_of_a_sun_agree_on_the_number_of_faces():
+    boxes = np.concatenate([BOXES, [[[-9.2, -9.2, 0.0], [9.2, 9.2, 0.0]]]])
+    sun = light("SUN", (0, 0, 0), (0.3, 0.2, -1), angle=40 * DEGREES)
+    counts = {len(light_faces(sun, boxes, emitter_sample(sun, i, np.zeros(3)))) for i in range(64)}
+    assert counts == {len(light_faces(sun, boxes))}
