@@ -82,6 +82,8 @@ def _boundary(fail: Callable[[str], None]) -> Iterator[None]:
     except USER_FAULTS as error:
         LOGGER.debug("user fault", exc_info=True)
         fail(_one_line(str(error)))
+    except KeyboardInterrupt:  # Ctrl-C where Blender is a Python module: it would go on and write a black picture
+        fail("interrupted")
     except Exception as error:  # our own fault: the boundary that architecture.md names
         LOGGER.exception("internal error")
         fail(_one_line(f"internal error, see the console: {type(error).__name__}: {error}"))

@@ -199,6 +199,16 @@ def test_own_fault_is_reported_once_and_writes_no_file(rebound_scene, tmp_path, 
     assert len([r for r in caplog.records if r.exc_info]) == 1
 
 
+def test_ctrl_c_writes_no_file(rebound_scene, tmp_path, monkeypatch):
+    def interrupt(*_args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rebound.renderer.Renderer.sample", interrupt)
+    with pytest.raises(RuntimeError, match="interrupted"):
+        render(rebound_scene, tmp_path / "a.exr")
+    assert not list(tmp_path.iterdir())
+
+
 def test_render_after_a_failed_one_works(rebound_scene, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("rebound.renderer.Renderer.begin", lambda *_: 1 / 0)
