@@ -12,6 +12,7 @@ import logging
 import queue
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from typing import TypeVar
@@ -59,7 +60,10 @@ class MainThread:
                 raise Cancelled
             if time.monotonic() > deadline and future.cancel():
                 raise MainThreadError(f"Blender's main thread did not answer for {patience:.0f} s")
-        return future.result()
+        try:
+            return future.result()
+        finally:
+            del future  # an error would refer to this frame, and this frame to the error
 
     def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` on the main thread some time later (now, where this is the main thread)."""
@@ -104,7 +108,28 @@ def _complete(future: Future, call: Callable[[], object]) -> None:
     try:
         future.set_result(call())
     except Exception as error:  # noqa: BLE001  not swallowed: handed to the thread that waits for it, which raises it
-        future.set_exception(error)
+        _forget_locals(error)
+        waiting = future
+        # This very frame is part of the traceback: what it still names would live, and die, with the error.
+        del future, call
+        waiting.set_exception(error)
+        del waiting
+
+
+def _forget_locals(error: BaseException) -> None:
+    """Let go of what the frames that an error came through still hold: GPU objects may die on this thread only.
+
+    The traceback keeps its lines. The errors that this one came of have frames of their own.
+    """
+    seen: set[int] = set()
+    waiting: list[BaseException | None] = [error]
+    while waiting:
+        at = waiting.pop()
+        if at is None or id(at) in seen:
+            continue
+        seen.add(id(at))
+        traceback.clear_frames(at.__traceback__)
+        waiting += (at.__cause__, at.__context__)
 
 
 # One per process, as Blender has one main thread. The timer is registered when the extension is enabled, because

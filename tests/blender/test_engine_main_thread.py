@@ -1,7 +1,9 @@
 """GPU work that a render thread hands to the main thread: results, errors, cancelling, a main thread that is gone."""
 
+import gc
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -52,6 +54,60 @@ def test_error_is_raised_where_it_is_waited_for():
     tick_until_done(main_thread, worker)
     assert isinstance(worker.error, ZeroDivisionError)
     main_thread.tick()  # and the timer lives on
+
+
+class Resource:
+    """Stands for a GPU object: it must die on the main thread."""
+
+
+class BrokenError(Exception):
+    """An error that can be watched."""
+
+
+@pytest.fixture
+def no_collector():
+    """What dies here dies because nothing refers to it, not because the collector came by, on whatever thread."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def test_error_keeps_nothing_of_the_main_thread_alive(no_collector):
+    main_thread, resources = MainThread(), []
+
+    def build():
+        resource = Resource()
+        resources.append(weakref.ref(resource))
+        raise BrokenError("made by the test")
+
+    def work():
+        whole = Resource()
+        resources.append(weakref.ref(whole))
+        try:
+            build()
+        except BrokenError as error:
+            raise ZeroDivisionError from error
+
+    worker = Worker(lambda: main_thread.run(work, never))
+    tick_until_done(main_thread, worker)
+    assert isinstance(worker.error, ZeroDivisionError), "the render thread has the error"
+    assert len(resources) == 2 and not any(resource() for resource in resources)
+
+
+def test_error_is_in_no_cycle(no_collector):
+    main_thread, errors = MainThread(), []
+
+    def work():
+        error = BrokenError("made by the test")
+        errors.append(weakref.ref(error))
+        raise error
+
+    worker = Worker(lambda: main_thread.run(work, never))
+    tick_until_done(main_thread, worker)
+    assert isinstance(worker.error, BrokenError)
+    worker.error = None
+    assert errors[0]() is None
 
 
 def test_cancelled_work_is_never_begun():
