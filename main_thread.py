@@ -86,10 +86,11 @@ class MainThread:
         end = time.monotonic() + BUDGET
         while time.monotonic() < end:
             try:
-                future, call = self._jobs.get_nowait()
+                job = self._jobs.get_nowait()
             except queue.Empty:
                 break
-            _complete(future, call)
+            _complete(*job)
+            del job  # an error refers to the frames it came through and to their callers, so to this one
             self._newest_job = time.monotonic()
         return BUSY_INTERVAL if time.monotonic() - self._newest_job < BUSY_AFTER_JOB else IDLE_INTERVAL
 
@@ -110,7 +111,7 @@ def _complete(future: Future, call: Callable[[], object]) -> None:
     except Exception as error:  # noqa: BLE001  not swallowed: handed to the thread that waits for it, which raises it
         _forget_locals(error)
         waiting = future
-        # This very frame is part of the traceback: what it still names would live, and die, with the error.
+        # This very frame is part of the traceback: what it still names would live and die with the error.
         del future, call
         waiting.set_exception(error)
         del waiting
