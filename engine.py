@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 import bpy
 
+from .device.blender import unbind
 from .device.interface import DeviceError
 from .final_render import render as render_final
 from .gpu_probe import missing_gpu
@@ -116,5 +117,6 @@ def unregister() -> None:
     if _stand_down_without_gpu in bpy.app.handlers.render_init:
         bpy.app.handlers.render_init.remove(_stand_down_without_gpu)
     SESSIONS.free_all()
+    unbind()
     if getattr(ReboundEngine, "is_registered"):  # noqa: B009  unknown to Blender's stubs
         bpy.utils.unregister_class(ReboundEngine)

@@ -16,11 +16,10 @@ import numpy as np
 
 from . import binding, blender_convert
 from .blender_log import PROBE, failed_stage, probed_line, run_captured, trace
-from .formats import FORMATS
 from .interface import Device, DeviceError, DrawState, Program, Target, Texture, Vertices, Viewport
 from .shader import Shader, ShaderError, Source
 
-_logger = logging.getLogger(__name__)
+_logger = logging.getLogger("rebound")  # by name: as an extension the package is bl_ext.….rebound
 
 # Untyped: the stubs spell out one version's literals, and ours are checked in Shader, Texture and DrawState.
 gpu: Any = _gpu
@@ -30,9 +29,15 @@ _IS_4_5 = bpy.app.version < (5, 0, 0)
 _HAS_SAMPLER_STATE = bpy.app.version >= (5, 2, 0)
 _BLEND = {"NONE": "NONE", "ADDITIVE": "ADDITIVE_PREMULT", "ALPHA_PREMULT": "ALPHA_PREMULT"}
 
-# Programs live as long as Blender: a shader that is freed while bound makes the next draw on OpenGL use the old
+# Programs live until the extension is disabled: a shader that is freed while bound makes the next draw on OpenGL use the old
 # program, and engine objects die on threads without a GPU context.
 _PROGRAMS: dict[Shader, Program] = {}
+
+
+def unbind() -> None:
+    """Bind no shader, because ours are freed after this: to be called when the extension is disabled."""
+    if _PROGRAMS:
+        gpu.shader.unbind()
 
 
 class BlenderDevice(Device):
@@ -66,6 +71,12 @@ class BlenderDevice(Device):
         self._pixel.handle.read()
         self._cleared = False
 
+    def close(self) -> None:
+        """Drop the device's own buffers. Programs stay: they are Blender's for as long as the extension is enabled."""
+        self._attributeless_buffers, self._attributeless = [], {}
+        self.free(self._pixel)
+        self._pixel = None
+
     def context_may_differ(self) -> None:
         """Say so before work in a timer of Blender's: it runs in the context of whichever window was drawn last.
 
@@ -73,19 +84,13 @@ class BlenderDevice(Device):
         """
         self._context += 1
 
-    def adopt(self, handle: Any) -> Texture:
-        """Wrap a 2D texture that Blender made (gpu.texture.from_image) for use as a sampler. Not freed by ``free``."""
-        texture = Texture((handle.width, handle.height), handle.format if handle.format in FORMATS else "RGBA16F")
-        texture.handle = handle
-        return texture
-
     def draw_to_current(self, shader: Shader, **resources: Any) -> None:
         """Draw a full-screen shader into what is bound now (a viewport in view_draw), within its viewport."""
         program = self._program(shader)
         program.check_names(resources, tuple(program.setters))
         self._check_idle(shader)
-        self._begin(program, None, DrawState(), None)
         try:
+            self._begin(program, None, DrawState(), None)
             program.set(resources)
             self._draw(program, None, 0, 3, 1)
         finally:
@@ -95,7 +100,7 @@ class BlenderDevice(Device):
 
     def _create_texture(self, texture: Texture, data: np.ndarray | None) -> None:
         if texture.repeat and not _HAS_SAMPLER_STATE:
-            raise DeviceError("Blender before 5.2 cannot repeat a texture: read it by texelFetch, or use adopt()")
+            raise DeviceError("Blender before 5.2 cannot repeat a texture: read it by texelFetch")
         options: dict[str, Any] = {"format": _FORMATS.get(texture.format, texture.format)}
         if texture.layers:
             options["layers"] = texture.layers
@@ -204,18 +209,21 @@ class BlenderDevice(Device):
         if target is not None:
             if target.handle[0] != self._context:
                 self._create_target(target)
-            self._bound = _bound(target.handle[1])
-            self._bound.__enter__()
+            bound = _bound(target.handle[1])
+            bound.__enter__()
+            self._bound = bound
             # On OpenGL a framebuffer keeps its viewport from bind to bind, on Vulkan it does not.
             gpu.state.viewport_set(*(viewport or (0, 0, *target.size)))
         _set_state(state)
         program.handle.bind()
 
     def _end(self, program: Program, target: Target | None) -> None:
-        _set_state(DrawState())
-        if target is not None:
-            bound, self._bound = self._bound, None
-            bound.__exit__(None, None, None)
+        bound, self._bound = self._bound, None  # None too where _begin failed before it was bound
+        try:
+            _set_state(DrawState())
+        finally:
+            if bound is not None:
+                bound.__exit__(None, None, None)
         if self._backend == "OPENGL" and binding.touches_images(program.shader):
             self._barrier()
 

@@ -73,9 +73,9 @@ class Drawing:
 
     def __enter__(self) -> Drawing:
         self._device._check_idle(self._program.shader)
-        self._device._begin(self._program, self._target, self._state, self._viewport)
         self._device._busy = self._program.shader
         try:
+            self._device._begin(self._program, self._target, self._state, self._viewport)
             self._program.set(self._shared)
         except BaseException:
             self.__exit__()

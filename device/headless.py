@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The standalone device: moderngl on an OpenGL 4.3 context of its own, with no window and no Blender.
 
-For tests, the bake worker and benchmarks. Never in Blender's own process: Blender's gpu calls would then run in this
-context. A 24 bit depth buffer stands in for DEPTH32F (moderngl makes no other).
+For tests. Never in Blender's own process: Blender's gpu calls would then run in this context. A 24 bit
+depth buffer stands in for DEPTH32F (moderngl makes no other).
 """
 
 import re
@@ -56,8 +56,8 @@ class HeadlessDevice(Device):
         self._ctx.finish()
 
     def close(self) -> None:
-        """Free everything. The device cannot be used afterwards."""
         self._programs.clear()
+        self._attributeless.clear()
         self._ctx.release()
 
     # --- resources ---------------------------------------------------------------------------------------------------

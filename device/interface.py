@@ -181,6 +181,10 @@ class Device(ABC):
         """Wait until the GPU has done everything."""
 
     @abstractmethod
+    def close(self) -> None:
+        """Give back what the device itself holds, on its thread. It cannot be used afterwards; twice does nothing."""
+
+    @abstractmethod
     def free(self, resource: Texture | Target | Vertices | None) -> None:
         """Give a resource's memory back now. A target's textures stay. Calling it twice, or with None, does nothing."""
 

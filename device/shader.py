@@ -165,11 +165,6 @@ class Shader:
         """Table and uniform structs, each once."""
         return tuple(dict.fromkeys((*self.uniforms.values(), *self.structs)))
 
-    @property
-    def resource_names(self) -> tuple[str, ...]:
-        """The keyword arguments of a draw or dispatch."""
-        return (*self.samplers, *self.images, *self.uniforms, *self.constants)
-
     # --- source ------------------------------------------------------------------------------------------------------
 
     def assemble(self, stage: str) -> Source:

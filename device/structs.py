@@ -192,10 +192,6 @@ class Struct:
             f"{texels} {self.name} e;{members} return e; }}"
         )
 
-    def glsl(self) -> str:
-        """The struct and its fetch function: what a shader that reads a table needs."""
-        return f"{self.glsl_struct()}\n{self.glsl_fetch()}\n"
-
 
 def table_texels(packed: np.ndarray) -> np.ndarray:
     """The texels of a table from what ``Struct.pack`` made, (n, texels, 4): one to MAX_TABLE_ROWS rows."""

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The device contract on Blender's device, on the backend that the run asked for."""
 
+import weakref
+
 import bpy
 import gpu
 import numpy as np
 import pytest
 
-from rebound.device import DeviceError, DrawState
+import rebound
+from rebound.device import DeviceError, DrawState, blender
 from rebound.device.blender import BlenderDevice
+from rebound.gpu_shaders import all_shaders
 from rebound.tests.support.device_contract import *  # noqa: F403
 from rebound.tests.support.device_contract import fragment, show
 from rebound.tests.support.device_contract_draw import *  # noqa: F403
@@ -65,17 +69,43 @@ def test_work_leaves_framebuffer_viewport_and_state_alone(device, screen):
     assert device.read(screen[0])[..., 2].sum() == 0.5 * 16
 
 
-def test_adopted_image_is_read_scene_linear(device, clean_scene):
-    image = bpy.data.images.new("adopted", 2, 1)
-    image.pixels.foreach_set(np.array([1, 0, 0, 1, 0, 128 / 255, 0, 1], np.float32))
-    image.update()
-    shader = fragment(
-        "adopt", "void main() { out_color = texelFetch(a_tx, ivec2(gl_FragCoord.xy), 0); }",
-        samplers={"a_tx": "FLOAT_2D"},
-    )  # fmt: skip
-    values = show(device, shader, (2, 1), a_tx=device.adopt(gpu.texture.from_image(image)))
-    # 128 of 255 in sRGB is 0.2159 linear; the hardware's table is good to about 8 bits.
-    np.testing.assert_allclose(values[0], [[1, 0, 0, 1], [0, 0.2159, 0, 1]], atol=1e-3)
+def test_failure_before_a_draw_leaves_framebuffer_and_device_alone(device, screen, monkeypatch):
+    target = canvas(device)
+    for draw in (
+        lambda: device.fullscreen(FADE, target, pc_blue=1.0),
+        lambda: device.draw_to_current(FADE, pc_blue=1.0),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(blender, "_set_state", lambda _state: 1 / 0)
+            with pytest.raises(ZeroDivisionError):
+                draw()
+        assert gpu.state.active_framebuffer_get() == screen[1]
+        assert gpu.state.viewport_get() == (4, 0, 4, 4)
+    assert show(device, FADE, pc_blue=0.5)[0, 0, 2] == 0.5
+
+
+def test_closed_device_holds_nothing():
+    device = BlenderDevice()
+    device.finish()
+    held = [weakref.ref(device._pixel), *device._attributeless_buffers]
+    assert held[0]() is not None and len(held) == 2
+    device.close()
+    device.close()
+    assert not held[0]() and device.allocated_bytes == 0
+    assert not any(getattr(device, name) for name in ("_attributeless_buffers", "_attributeless", "_pixel", "_bound"))
+
+
+def test_no_shader_is_bound_when_the_extension_is_disabled(device, monkeypatch):
+    show(device, FADE, pc_blue=1.0)
+    calls = []
+    monkeypatch.setattr(gpu.shader, "unbind", lambda: calls.append(1))
+    rebound.unregister()
+    assert calls == [1]
+
+
+@pytest.mark.parametrize("shader", all_shaders(), ids=lambda shader: shader.name)
+def test_declared_shader_compiles(device, shader):
+    assert device._program(shader).shader is shader
 
 
 def test_programs_outlive_a_device(device):
