@@ -58,11 +58,11 @@ class _FinalRender:
 
     def run(self) -> None:
         self.engine.update_stats("", "Reading the scene")
-        self.session.sync(self.depsgraph, for_viewport=False)
-        if not self.engine.is_preview:  # whose scene is Blender's, not the user's
-            self._announce()
-        view = _view(self.engine, self.depsgraph)
         try:
+            self.session.sync(self.depsgraph, for_viewport=False, on_main_thread=self._on_main_thread)
+            if not self.engine.is_preview:  # whose scene is Blender's, not the user's
+                self._announce()
+            view = _view(self.engine, self.depsgraph)
             picture = self._gpu(lambda: self.session.picture(view, self.settings))
             with _open_result(self.engine, self.depsgraph, view) as result:
                 self._accumulate(picture, result)
@@ -119,6 +119,9 @@ class _FinalRender:
         if whole and (picture.samples == self.total or now - self.logged >= LOG_SECONDS):
             self.logged = now
             LOGGER.info("sample %d/%d, %.1f s", picture.samples, self.total, now - self.started)
+
+    def _on_main_thread(self, call: Callable[[], T]) -> T:
+        return MAIN_THREAD.run(call, self.engine.test_break)
 
     def _gpu(self, call: Callable[[], T], cancelled: Callable[[], bool] | None = None, patience=NO_ANSWER) -> T:
         """Run a piece of GPU work where the GPU context is."""

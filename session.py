@@ -121,6 +121,7 @@ class _Gpu:
     def free(self) -> None:
         self.renderer.free()
         self.scene.free()
+        self.device.close()
 
 
 class Session:
@@ -133,9 +134,9 @@ class Session:
         self._picture: Picture | None = None
         SESSIONS.alive.add(self)
 
-    def sync(self, depsgraph, *, for_viewport: bool, visible: Callable[[Any], bool] | None = None) -> None:
-        """Read the depsgraph: CPU work, on any thread. Raises SceneError where nothing can be rendered."""
-        self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, visible=visible)
+    def sync(self, depsgraph, *, for_viewport: bool, **options: Any) -> None:
+        """Read the depsgraph: CPU work, on any thread. ``options`` are further ones of ``convert_scene``."""
+        self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, **options)
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
         self.status.error = ""
 

@@ -8,13 +8,10 @@ import numpy as np
 
 from .cameras import FARTHEST, camera_warning
 from .data import Array, Instance, Light, Mesh, Scene, Visibility
-from .errors import SceneError
-from .images import ImageReader
+from .images import ImageReader, OnMainThread
 from .lights import read_light
 from .materials import MaterialTable, read_world
 from .meshes import content_key, mesh_key, read_mesh
-
-__all__ = ["SceneError", "convert_scene"]
 
 UNSHOWN_TYPES = {
     "CURVES": "hair curves",
@@ -24,22 +21,27 @@ UNSHOWN_TYPES = {
 }
 
 
+def _here(call: Callable[[], object]) -> object:
+    return call()
+
+
 def convert_scene(
     depsgraph,
     *,
     for_viewport: bool,
-    view_layer=None,
     previous: Scene | None = None,
     visible: Callable[[object], bool] | None = None,
+    on_main_thread: OnMainThread = _here,
 ) -> Scene:
     """Read everything that a frame needs from an evaluated depsgraph.
 
     ``previous`` is an older scene of the same session: meshes and images whose key did not change are taken from it,
     as the same objects. ``visible`` is asked about each original object (the instancer, for an instance) and hides
-    what it declines; a viewport passes its local view there. ``view_layer`` defaults to the depsgraph's own.
-    What cannot be read stands in Scene.warnings; nothing is raised for it.
+    what it declines; a viewport passes its local view there. ``on_main_thread`` runs a call on Blender's main thread
+    and returns its result: needed where this runs on another one, since a sequence's frames are read through
+    data-blocks. What cannot be read stands in Scene.warnings; nothing is raised for it.
     """
-    reader = _SceneReader(depsgraph, for_viewport, view_layer, previous or Scene(), visible)
+    reader = _SceneReader(depsgraph, for_viewport, previous or Scene(), visible, on_main_thread)
     for instance in depsgraph.object_instances:
         reader.add(instance)
     return reader.scene()
@@ -48,14 +50,14 @@ def convert_scene(
 class _SceneReader:
     """Collects one scene while the depsgraph's instances go by; nothing of Blender's is kept past one of them."""
 
-    def __init__(self, depsgraph, for_viewport, view_layer, previous, visible):
+    def __init__(self, depsgraph, for_viewport, previous, visible, on_main_thread):
         self.depsgraph = depsgraph
         self.for_viewport = for_viewport
-        self.view_layer = view_layer or depsgraph.view_layer_eval
+        self.view_layer = depsgraph.view_layer_eval
         self.previous = previous
         self.visible = visible
         self.warnings: dict[str, None] = {}  # an ordered set: each line once
-        self.images = ImageReader(previous.images, self.warn)
+        self.images = ImageReader(previous.images, self.warn, on_main_thread)
         self.materials = MaterialTable(self.images, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.instances: list[Instance] = []

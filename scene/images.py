@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-import threading
 from collections.abc import Callable, Hashable, Mapping
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Color
 
 from .data import Array, Image
+
+OnMainThread = Callable[[Callable[[], object]], Any]  # runs a call where data-blocks may be made; gives its result
 
 MAX_SIZE = 4096  # pixels along the longer side; larger images are averaged down, so that one of them fits the GPU
 
@@ -29,8 +31,9 @@ LINEAR_SPACES: Mapping[str, str] = {
 class ImageReader:
     """Reads each image of a scene once; ``images`` holds what was read, or reused from the previous scene."""
 
-    def __init__(self, previous: Mapping[Hashable, Image], warn: Callable[[str], None]):
+    def __init__(self, previous: Mapping[Hashable, Image], warn: Callable[[str], None], on_main_thread: OnMainThread):
         self.images: dict[Hashable, Image] = {}
+        self._on_main_thread = on_main_thread
         self._previous = previous
         self._warn = warn
         self._done: dict[tuple[int, str], Hashable | None] = {}
@@ -49,7 +52,7 @@ class ImageReader:
 
     def _read(self, image, path: str) -> Hashable | None:
         key = image_key(image, path)
-        found = self._previous.get(key) or (_read_frame(image, key, path) if path else read_image(image, key))
+        found = self._previous.get(key) or self._read_pixels(image, key, path)
         if found is None:
             name = path or image.filepath
             reason = f"the file '{name}' is missing or cannot be read" if name else "it has no pixels"
@@ -59,6 +62,11 @@ class ImageReader:
             self._warn(line)
         self.images[key] = found
         return key
+
+    def _read_pixels(self, image, key: Hashable, path: str) -> Image | None:
+        if not path:
+            return read_image(image, key)
+        return self._on_main_thread(lambda: _read_frame(image, key, path))
 
 
 def frame_path(image, user) -> str:
@@ -71,9 +79,9 @@ def frame_path(image, user) -> str:
 def _read_frame(image, key: Hashable, path: str) -> Image | None:
     """Read one frame of a sequence through a temporary data-block: Image.pixels itself knows no frame.
 
-    Only on the main thread, where data-blocks may be made; elsewhere the frame counts as missing.
+    Only on the main thread, where data-blocks may be made.
     """
-    if threading.current_thread() is not threading.main_thread() or not os.path.isfile(path):
+    if not os.path.isfile(path):
         return None
     frame = bpy.data.images.load(path)
     try:

@@ -1,6 +1,7 @@
 """A final render in background: registration, progress, passes, layers, border, failures and what they leave behind."""
 
 import logging
+import threading
 
 import bpy
 import numpy as np
@@ -10,7 +11,7 @@ import rebound
 from rebound import engine as engine_module
 from rebound.passes import PASSES
 from rebound.render_result import view_layer_property
-from rebound.session import SESSIONS
+from rebound.session import SESSIONS, Session
 from rebound.tests.support.engine_build import HEIGHT, WIDTH, channels, picture, rebound_scene, render
 
 __all__ = ["rebound_scene"]
@@ -187,6 +188,18 @@ def test_cancel_keeps_the_samples_so_far(rebound_scene, tmp_path, monkeypatch, c
     np.testing.assert_array_equal(image, picture(render(rebound_scene, tmp_path / "b.exr")))
 
 
+def test_sync_gets_the_way_to_the_main_thread(rebound_scene, tmp_path, monkeypatch):
+    calls, sync = [], Session.sync
+
+    def spy(session, depsgraph, **options):
+        calls.append(options["on_main_thread"](threading.current_thread))
+        sync(session, depsgraph, **options)
+
+    monkeypatch.setattr(Session, "sync", spy)
+    render(rebound_scene, tmp_path / "a.exr")
+    assert calls == [threading.main_thread()]
+
+
 def test_own_fault_is_reported_once_and_writes_no_file(rebound_scene, tmp_path, monkeypatch, caplog):
     def fail(*_args):
         raise ZeroDivisionError("made by the test")
@@ -217,6 +230,9 @@ def test_render_after_a_failed_one_works(rebound_scene, tmp_path, monkeypatch):
     assert picture(render(rebound_scene, tmp_path / "a.exr")).max() > 0.1
 
 
-def test_render_frees_its_session(rebound_scene, tmp_path):
+def test_render_frees_its_session(rebound_scene, tmp_path, monkeypatch):
+    closed = []
+    monkeypatch.setattr("rebound.device.blender.BlenderDevice.close", lambda device: closed.append(device))
     render(rebound_scene, tmp_path / "a.exr")
     assert all(session._gpu is None for session in SESSIONS.alive)
+    assert len(closed) == 1, "the device's own buffers go on the same thread"

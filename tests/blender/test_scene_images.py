@@ -1,11 +1,17 @@
 """Images arrive scene-linear, whatever they are made of; missing ones are magenta."""
 
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import bpy
 import numpy as np
 import pytest
 
+from rebound.main_thread import MainThread
 from rebound.scene import images
 from rebound.scene.changes import Changes
+from rebound.scene.convert import convert_scene
 from rebound.tests.support.blender_build import convert, link, material, mesh
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
@@ -249,3 +255,29 @@ def test_missing_frame_of_a_sequence_is_magenta(tmp_path):
     scene = convert()
     assert material_of(scene).base_color == (1, 0, 1)
     assert len(scene.warnings) == 1 and "clip0002.png" in scene.warnings[0]
+
+
+def test_frame_of_a_sequence_is_loaded_on_the_main_thread(tmp_path, monkeypatch):
+    """F12 in a window converts the scene in a thread of its own, where no data-block may be made."""
+    sequence(tmp_path)
+    bpy.context.scene.frame_set(2)
+    depsgraph, main_thread, loaded_on = bpy.context.evaluated_depsgraph_get(), MainThread(), []
+    read_frame = images._read_frame
+    monkeypatch.setattr(
+        images, "_read_frame", lambda *args: (loaded_on.append(threading.current_thread()), read_frame(*args))[1]
+    )
+
+    def render_thread():
+        return convert_scene(
+            depsgraph, for_viewport=False, on_main_thread=lambda call: main_thread.run(call, lambda: False)
+        )
+
+    with ThreadPoolExecutor(1) as pool:
+        converted = pool.submit(render_thread)
+        while not converted.done():
+            main_thread.tick()
+            time.sleep(0.001)
+    scene = converted.result()
+    assert loaded_on == [threading.main_thread()]
+    assert pixels_of(scene)[0, 0, 0] == pytest.approx(0.5, abs=0.01)
+    assert scene.warnings == () and len(bpy.data.images) == 1
