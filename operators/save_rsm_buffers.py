@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import bpy
@@ -15,7 +14,6 @@ from ..renderer import RenderError, RsmBuffers
 from ..scene.errors import SceneError
 from ..session import Session, read_settings
 
-LOGGER = logging.getLogger("rebound")
 CHANNELS = {"depth": "Z", "position": "XYZ", "normal": "XYZ", "flux": "RGB"}
 USER_FAULTS = (SceneError, RenderError, DeviceError, ExrError)
 

@@ -42,12 +42,6 @@ def camera_warning(camera) -> str | None:
     return None
 
 
-def render_size(render) -> tuple[int, int]:
-    """Full size of a final render in pixels, from bpy's RenderSettings, without its border."""
-    percent = render.resolution_percentage
-    return max(render.resolution_x * percent // 100, 1), max(render.resolution_y * percent // 100, 1)
-
-
 def border_pixels(render, width: int, height: int) -> Border | None:
     """The render border in whole pixels, rounded as Blender does, or None where the whole picture is rendered."""
     if not render.use_border:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from .data import AreaShape, Array, Light, LightKind
-from .nodes import light_emission, node_tree
+from .nodes import RGB, active_output, find_input, node_tree, source, strength_and_color
 
 MIN_SPREAD = math.radians(1.0)  # Blender allows 0, a laser that no grid of samples would ever hit
 ROUND_SHAPES = {AreaShape.DISK, AreaShape.ELLIPSE}
@@ -51,11 +51,25 @@ def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], Non
         power *= normalization(light, kind, matrix)
     tree = node_tree(light)
     if tree is not None:
-        power *= np.array(light_emission(light.name, tree, warn))
+        power *= np.array(_emission(light.name, tree, warn))
     if not np.isfinite(power).all() or (power < 0.0).any():
         warn(f"Light '{light.name}': its power is negative or not a number; it is left out")
         return (0.0, 0.0, 0.0)
     return float(power[0]), float(power[1]), float(power[2])
+
+
+def _emission(name: str, tree, warn: Callable[[str], None]) -> RGB:
+    """What a light's nodes multiply its power by. Black where nothing is connected, as in Cycles."""
+    owner = f"Light '{name}'"
+    output = active_output(tree)
+    surface = output and find_input(output, "Surface")
+    if not surface or not surface.socket.is_linked:
+        return (0.0, 0.0, 0.0)
+    found = source(surface)
+    if found.socket.is_output and found.node.bl_idname == "ShaderNodeEmission" and not found.node.mute:
+        return strength_and_color(found, owner, "the socket's own value is used", warn)
+    warn(f"{owner}: node '{found.node.name}' is not read yet; the light shines as if it had no nodes")
+    return (1.0, 1.0, 1.0)
 
 
 def normalization(light, kind: LightKind, matrix: Array) -> float:

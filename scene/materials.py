@@ -14,10 +14,10 @@ from .nodes import (
     RGB,
     Socket,
     active_output,
+    all_nodes,
     constant,
     default_rgb,
     find_input,
-    linked_groups,
     mean,
     node_tree,
     source,
@@ -284,7 +284,7 @@ def read_world(world, warn: Callable[[str], None]) -> World:
     found = source(surface)
     if found.socket.is_output and found.node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
         return World(strength_and_color(found, owner, "the socket's own value is shown", warn))
-    for node in linked_groups(tree):
+    for node in all_nodes(tree):
         if node.bl_idname == "ShaderNodeBackground":
             warn(f"{owner}: node '{found.node.name}' is not read yet; its node '{node.name}' is shown alone")
             return World(strength_and_color(Socket(node.outputs[0]), owner, "the socket's own value is shown", warn))

@@ -1,6 +1,6 @@
 """Walking Blender's shader node trees: links through reroutes, muted nodes and groups, and constant folding.
 
-Knows nothing of what a shader means; ``materials`` and the world and light readers below ask it for constants.
+Knows nothing of what a shader means; ``materials`` and ``lights`` ask it for constants.
 """
 
 from __future__ import annotations
@@ -149,23 +149,9 @@ def strength_and_color(node_socket: Socket, owner: str, fallback: str, warn: Cal
     return tuple(c * mean(strength) for c in color)
 
 
-def light_emission(name: str, tree, warn: Callable[[str], None]) -> RGB:
-    """What a light's nodes multiply its power by. Black where nothing is connected, as in Cycles."""
-    owner = f"Light '{name}'"
-    output = active_output(tree)
-    surface = output and find_input(output, "Surface")
-    if not surface or not surface.socket.is_linked:
-        return (0.0, 0.0, 0.0)
-    found = source(surface)
-    if found.socket.is_output and found.node.bl_idname == "ShaderNodeEmission" and not found.node.mute:
-        return strength_and_color(found, owner, "the socket's own value is used", warn)
-    warn(f"{owner}: node '{found.node.name}' is not read yet; the light shines as if it had no nodes")
-    return (1.0, 1.0, 1.0)
-
-
-def linked_groups(tree) -> Iterator:
+def all_nodes(tree) -> Iterator:
     """Every node of a tree, those inside groups included."""
     for node in tree.nodes:
         yield node
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            yield from linked_groups(node.node_tree)
+            yield from all_nodes(node.node_tree)
