@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .device.interface import Device, Texture, Vertices
-from .gpu_shaders.frame.structs import INSTANCE, MATERIAL
+from .gpu_shaders.frame.structs import IMAGE_CLOSEST, IMAGE_EXTEND, INSTANCE, MATERIAL
 from .gpu_shaders.frame.tables import replace_table
 from .scene.changes import Changes, world_bounds
 from .scene.data import Image, Instance, Material, Mesh, Scene, Visibility
 from .scene.data import Texture as ImageLookup
+
+# Updates whose moved boxes are kept. A light map that was not looked at for longer is drawn again.
+REMEMBERED_MOVES = 64
 
 UvMaps = tuple[str, str]  # the maps that the base colour's and the emission's texture use
 
@@ -62,17 +65,17 @@ class GpuScene:
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
         if changes.geometry or self.instance_table is None or maps_before != _material_uv_maps(scene):
-            self._place(scene, changes)
+            self._place(scene)
         if len(changes.moved_bounds):
             self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
-            del self._moved[:-64]
+            del self._moved[:-REMEMBERED_MOVES]
 
     def moved_since(self, revision: int, *, shapes_only: bool = False) -> np.ndarray | None:
         """World boxes (n, 2, 3) where something changed after ``revision``; None: too long ago to tell.
 
         ``shapes_only`` leaves out what only looks different.
         """
-        if self._moved and len(self._moved) == 64 and revision < self._moved[0][0]:
+        if self._moved and len(self._moved) == REMEMBERED_MOVES and revision < self._moved[0][0]:
             return None
         boxes = [shapes if shapes_only else moved for when, moved, shapes in self._moved if when > revision]
         return np.concatenate(boxes) if boxes else np.zeros((0, 2, 3))
@@ -118,7 +121,7 @@ class GpuScene:
         ]
         self.material_table = replace_table(self.device, MATERIAL.pack(rows), self.material_table)
 
-    def _place(self, scene: Scene, changes: Changes) -> None:
+    def _place(self, scene: Scene) -> None:
         """Upload new meshes and the table of instances, and list the draws."""
         self.uploads["instances"] += 1
         groups: dict[tuple, list[Instance]] = defaultdict(list)
@@ -162,7 +165,7 @@ class GpuScene:
 
 
 def _image_mode(lookup: ImageLookup | None) -> int:
-    return -1 if lookup is None else int(lookup.closest) + 2 * int(not lookup.repeat)
+    return -1 if lookup is None else IMAGE_CLOSEST * lookup.closest + IMAGE_EXTEND * (not lookup.repeat)
 
 
 def _uv_maps(material: Material, mesh: Mesh) -> UvMaps:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .device.interface import Device, Target, Texture
-from .gpu_scene import GpuScene
+from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.direct import DirectLight
-from .gpu_shaders.frame.draws import ADD, draw_shaded, visible_draws
+from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
 from .gpu_shaders.frame.inputs import FrameInputs, GBuffer
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
@@ -26,6 +26,9 @@ from .scene.data import View, Visibility
 from .settings import SETTINGS, Settings
 
 __all__ = ["PASSES", "SETTINGS", "Frame", "RenderError", "RenderPass", "Renderer", "RsmBuffers", "Settings"]
+
+# How far a sample is after each step, for the progress bar: about their shares of the time.
+GBUFFER_DONE, DIRECT_DONE, INDIRECT_DONE = 0.1, 0.4, 0.95
 
 SUMS = tuple(ACCUMULATE.outputs)  # the accumulated textures, in slot order
 
@@ -122,17 +125,17 @@ class Renderer:
         inputs = FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, int(settings["seed"]))
         self._triangles = gpu_scene.triangle_count
         self._draw_gbuffer(frame, inputs)
-        yield 0.1
+        yield GBUFFER_DONE
         self.device.clear(frame.direct_target)
         filtered = settings["soft_shadows"] == "FILTERED"
         resolution = int(settings["shadow_resolution"])
         for done in self._direct.draw(inputs, frame.direct_target, filtered=filtered, resolution=resolution):
-            yield 0.1 + 0.3 * done
+            yield GBUFFER_DONE + (DIRECT_DONE - GBUFFER_DONE) * done
         self.device.clear(frame.indirect_target)
         technique = self._technique(settings)
         if technique is not None:
             for done in technique.indirect(inputs, settings.of(technique.id), frame.indirect_target):
-                yield 0.4 + 0.55 * done
+                yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         self._accumulate(frame, inputs)
         yield 1.0
 
@@ -207,12 +210,19 @@ class Renderer:
         world_from_view = np.linalg.inv(view.view_from_world)
         eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
         self.device.clear(frame.gbuffer_target)
-        draw_shaded(
+
+        def each(draw: Draw) -> dict:
+            holdout = int(bool(draw.visibility & Visibility.HOLDOUT))
+            return {"pc_holdout": holdout, **material_of(inputs.gpu_scene, draw)}
+
+        draw_scene(
             self.device,
             inputs.gpu_scene,
             GBUFFER,
             frame.gbuffer_target,
             visible_draws(inputs.gpu_scene, Visibility.CAMERA | Visibility.HOLDOUT),
+            each,
+            material_tx=inputs.gpu_scene.material_table,
             pc_clip_from_world=clip_from_world,
             pc_eye=eye,
         )

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...device.interface import Device, Target, Texture
 from ...scene.data import Light, Visibility
-from .draws import ADD, draw_depth, visible_draws
+from .draws import ADD, draw_scene, visible_draws
 from .inputs import FrameInputs
 from .light_maps import LightMaps, MapTile
 from .lights import emitter_sample, has_size, light_row
-from .maps import light_faces
+from .maps import Face, light_faces
 from .shaders import DIRECT, SHADOW
 from .structs import LIGHT
 from .tables import replace_table
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Lights in one full-screen pass: a GPU that is busy for seconds in one call is reset by its driver.
 LIGHTS_A_PASS = 16
+# How far direct light is when the shadow maps are drawn, for the progress bar.
+SHADOWS_DONE = 0.8
 
 
 class DirectLight:
@@ -32,6 +34,8 @@ class DirectLight:
         self.device = device
         self.maps = LightMaps(device, ["RG16F"])
         self.light_table: Texture | None = None
+        self._up_to_date: tuple[int, bool, int] | None = None  # scene revision and settings of the last sample
+        self._faces_of_still_lights: dict[Hashable, tuple[Face, ...]] = {}
 
     def draw(self, inputs: FrameInputs, target: Target, *, filtered: bool, resolution: int) -> Iterator[float]:
         """Write this sample's direct irradiance / pi into ``target``; yields progress 0..1.
@@ -40,45 +44,67 @@ class DirectLight:
         the map is drawn anew from a new point of the emitter every sample, which converges to the true penumbra.
         """
         lights = inputs.gpu_scene.scene.lights
-        self._prepare(inputs, lights, filtered, resolution)
-        for done in self._draw_shadows(inputs.gpu_scene):
-            yield 0.8 * done
+        for done in self._update(inputs, filtered, resolution):
+            yield SHADOWS_DONE * done
         for first in range(0, len(lights), LIGHTS_A_PASS):
             self._shade(inputs, target, first, min(first + LIGHTS_A_PASS, len(lights)))
-            yield 0.8 + 0.2 * first / len(lights)
+            yield SHADOWS_DONE + (1.0 - SHADOWS_DONE) * first / len(lights)
 
     def free(self) -> None:
         self.maps.free()
         if self.light_table is not None:
             self.device.free(self.light_table)
             self.light_table = None
+        self._up_to_date = None
 
-    def _prepare(self, inputs: FrameInputs, lights: tuple[Light, ...], filtered: bool, resolution: int) -> None:
+    def _update(self, inputs: FrameInputs, filtered: bool, resolution: int) -> Iterator[float]:
+        """Bring light table and shadow maps up to date for this sample; yields progress 0..1."""
+        key = (inputs.gpu_scene.revision, filtered, resolution)
+        if key != self._up_to_date:
+            self._up_to_date, self._faces_of_still_lights = None, {}
+        elif not self._any_moves(inputs, filtered):
+            return
+        self._lay_out(inputs, filtered, resolution)
+        yield from self._draw_shadows(inputs.gpu_scene)
+        self._up_to_date = key
+
+    def _any_moves(self, inputs: FrameInputs, filtered: bool) -> bool:
+        """Whether some light shines from another point of its emitter in every sample."""
+        return not filtered and any(has_size(light) for light in inputs.gpu_scene.scene.lights)
+
+    def _lay_out(self, inputs: FrameInputs, filtered: bool, resolution: int) -> None:
         tiles: list[MapTile] = []
         rows = []
-        for index, light in enumerate(lights):
-            sampled = has_size(light) and not filtered
-            source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index))
-            faces = ()
-            if light.casts_shadow:
-                faces = light_faces(light, inputs.gpu_scene.boxes, source if sampled else None)
-            rows.append(light_row(light, source, not sampled, len(tiles), len(faces)))
+        for index, light in enumerate(inputs.gpu_scene.scene.lights):
+            moves = has_size(light) and not filtered
+            source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index)) if moves else None
+            faces = self._faces(light, inputs.gpu_scene.boxes, source)
+            rows.append(light_row(light, source, len(tiles), len(faces)))
             tiles += [MapTile(light.key, index, face) for face in faces]
         self.maps.lay_out(tiles, resolution)
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _faces(self, light: Light, boxes: np.ndarray, source: np.ndarray | None) -> tuple[Face, ...]:
+        if not light.casts_shadow:
+            return ()
+        if source is not None:
+            return light_faces(light, boxes, source)
+        if light.key not in self._faces_of_still_lights:
+            self._faces_of_still_lights[light.key] = light_faces(light, boxes)
+        return self._faces_of_still_lights[light.key]
 
     def _draw_shadows(self, gpu_scene: GpuScene) -> Iterator[float]:
         stale = self.maps.stale(gpu_scene)
         for done, tile in enumerate(stale):
             target, viewport = self.maps.begin(tile, gpu_scene)
             draws = visible_draws(gpu_scene, Visibility.SHADOW, tile.face.sees)
-            draw_depth(
+            draw_scene(
                 self.device,
                 gpu_scene,
                 SHADOW,
                 target,
                 draws,
-                viewport,
+                viewport=viewport,
                 pc_clip_from_world=tile.face.clip_from_world,
                 pc_perspective=int(tile.face.perspective),
                 pc_far=tile.face.far,
@@ -106,4 +132,4 @@ class DirectLight:
 
 def _offset(seed: int, light: int) -> np.ndarray:
     """Where the light's sequence of emitter points begins: its own for every light, and always the same."""
-    return np.random.default_rng((seed & 0xFFFF, light)).random(3)
+    return np.random.default_rng((seed, light)).random(3)

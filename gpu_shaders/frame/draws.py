@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...device.interface import Device, DrawState, Target
+from ...device.interface import Device, DrawState, Target, Viewport
 from ...device.shader import Shader
 from ...scene.data import Visibility
 
@@ -25,12 +26,19 @@ def visible_draws(gpu_scene: GpuScene, visibility: Visibility, seen=None) -> lis
     return [draw for draw, inside in zip(draws, seen(np.array([d.bounds for d in draws])), strict=True) if inside]
 
 
-def draw_shaded(
-    device: Device, gpu_scene: GpuScene, shader: Shader, target: Target, draws: list[Draw], viewport=None, **shared
+def draw_scene(
+    device: Device,
+    gpu_scene: GpuScene,
+    shader: Shader,
+    target: Target,
+    draws: Sequence[Draw],
+    each: Callable[[Draw], Mapping[str, Any]] = lambda draw: {},
+    viewport: Viewport | None = None,
+    **shared: Any,
 ) -> None:
-    """Draw with materials: ``shader`` reads the material table and the two image samplers."""
-    tables = {"instance_tx": gpu_scene.instance_table, "material_tx": gpu_scene.material_table}
-    with device.drawing(shader, target, state=OPAQUE, viewport=viewport, **tables, **shared) as draw_call:
+    """Draw with depth test. ``each`` gives what the shader wants to know of a draw beside its instances."""
+    shared["instance_tx"] = gpu_scene.instance_table
+    with device.drawing(shader, target, state=OPAQUE, viewport=viewport, **shared) as draw_call:
         for draw in draws:
             draw_call(
                 draw.vertices,
@@ -38,30 +46,10 @@ def draw_shaded(
                 count=draw.vertex_count,
                 instances=draw.instance_count,
                 pc_first_instance=draw.first_instance,
-                pc_material=draw.material,
-                **_flag(shader, draw),
-                **gpu_scene.textures_of(draw.material),
+                **each(draw),
             )
 
 
-def draw_depth(
-    device: Device, gpu_scene: GpuScene, shader: Shader, target: Target, draws: list[Draw], viewport=None, **shared
-) -> None:
-    """Draw shapes only."""
-    tables = {"instance_tx": gpu_scene.instance_table}
-    with device.drawing(shader, target, state=OPAQUE, viewport=viewport, **tables, **shared) as draw_call:
-        for draw in draws:
-            draw_call(
-                draw.vertices,
-                first=draw.first_vertex,
-                count=draw.vertex_count,
-                instances=draw.instance_count,
-                pc_first_instance=draw.first_instance,
-            )
-
-
-def _flag(shader: Shader, draw: Draw) -> dict[str, int]:
-    """The one bit a shader wants to know of a draw's visibility."""
-    if "pc_holdout" in shader.constants:
-        return {"pc_holdout": int(bool(draw.visibility & Visibility.HOLDOUT))}
-    return {"pc_reflects": int(bool(draw.visibility & Visibility.BOUNCE))}
+def material_of(gpu_scene: GpuScene, draw: Draw) -> dict[str, Any]:
+    """What a shader that evaluates materials wants to know of a draw; it reads the material table as well."""
+    return {"pc_material": draw.material, **gpu_scene.textures_of(draw.material)}

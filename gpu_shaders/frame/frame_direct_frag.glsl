@@ -2,22 +2,22 @@
 #include "frame/shadow_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 
-/* Where this pixel's light comes from: the light's own sample of this frame, or, where shadows are filtered, a point of the
- * emitter of the pixel's own. */
+/* Where this pixel's light comes from: the light's own sample of this frame, or, where shadows are filtered, a point of
+ * the emitter of the pixel's own. */
 vec3 direct_source(Light light, vec3 P, vec2 noise)
 {
-  bool spot = light.kind == LIGHT_SPOT && light.blur_radius > 0.0;
+  bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0;
   if (light.filtered == 0 || !(spot || light.kind == LIGHT_AREA)) {
     return light.source;
   }
   vec2 place = 2.0 * noise - 1.0;
   if (spot || light.round_shape != 0) {
-    place = sqrt(noise.x) * vec2(cos(2.0 * SAMPLING_PI * noise.y), sin(2.0 * SAMPLING_PI * noise.y));
+    place = sqrt(noise.x) * vec2(cos(2.0 * MATH_PI * noise.y), sin(2.0 * MATH_PI * noise.y));
   }
   if (spot) {
     vec3 axis = normalize(light.position - P);
     vec3 side = normalize(cross(axis, abs(axis.x) < 0.9 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)));
-    return light.position + light.blur_radius * (place.x * side + place.y * cross(axis, side));
+    return light.position + light.emitter_radius * (place.x * side + place.y * cross(axis, side));
   }
   return light.position + place.x * light.half_size.x * light.axis_x + place.y * light.half_size.y * light.axis_y;
 }
@@ -34,13 +34,13 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
     face = map_face_fetch(face_tx, light.first_face + 1);
   }
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
-  bool spot = light.kind == LIGHT_SPOT && light.blur_radius > 0.0 && light.face_count == 1;
+  bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;
   vec3 p = map_position(face, P);
   if (!map_holds(face, p) && !(spot && p.z > face.near)) {
     return 1.0;
   }
-  if (light.filtered != 0 && light.blur_radius > 0.0) {
-    return shadow_soft(face, shadow_depth_tx, shadow_slope_tx, P, geometric, light.blur_radius, noise);
+  if (light.filtered != 0 && light.emitter_radius > 0.0) {
+    return shadow_soft(face, shadow_depth_tx, shadow_slope_tx, P, geometric, light.emitter_radius, noise);
   }
   return shadow_hard(face, shadow_depth_tx, shadow_slope_tx, P, geometric, noise);
 }
@@ -65,7 +65,7 @@ void main()
     vec3 direction = light.kind == LIGHT_SUN ? source : (whole ? light.position : source) - position.xyz;
     vec3 irradiance = light_unshadowed(light, position.xyz, N, source);
     /* The upper part of a light whose centre is below the horizon still shines. */
-    float below = whole ? light.blur_radius : 0.0;
+    float below = whole ? light.emitter_radius : 0.0;
     if (dot(geometric, direction) > -below && any(greaterThan(irradiance, vec3(0.0)))) {
       noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2 * i + 1));
       sum += irradiance * direct_visibility(light, position.xyz, geometric, noise);

@@ -3,7 +3,6 @@
 
 void main()
 {
-  /* gl_FragCoord.w is 1 / clip w: the view depth of a perspective view, 1 for an orthographic one. */
   vec3 to_eye = pc_eye.w > 0.5 ? pc_eye.xyz - v_position : pc_eye.xyz;
   vec3 geometric = surface_geometric_normal(v_position, normalize(to_eye));
   vec3 normal = surface_shading_normal(v_normal, geometric);

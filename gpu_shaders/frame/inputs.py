@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from ...gpu_scene import GpuScene
 
 
+# Seeds that one use of noise may count on from its own, as many as two for each of 2048 lights; and uses in a frame.
+# With a frame's seed of up to 65535 all of them fit a shader's signed integer.
+SEEDS_A_STREAM, STREAMS = 1 << 12, 4
+
+
 @dataclass(frozen=True, eq=False)
 class GBuffer:
     """What the camera sees, one texel a pixel.
@@ -47,4 +52,4 @@ class FrameInputs:
         """A seed for sampling_hash(), the same for all samples: they walk along one sequence in every pixel, which
         converges faster than numbers that know nothing of each other. ``stream`` tells its uses apart.
         """
-        return (self.seed * 7919 + stream * 15485863) & 0x3FFFFFFF
+        return (self.seed * STREAMS + stream) * SEEDS_A_STREAM

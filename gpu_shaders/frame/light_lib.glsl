@@ -1,15 +1,9 @@
 /* Lights in Cycles' units (docs/lights.md). `intensity` is P / (4 pi) W/sr of a point or spot, P / pi of an area light
- * (W/sr along its axis), the irradiance E of a sun. */
+ * (W/sr along its axis), the irradiance E of a sun. LIGHT_POINT ... LIGHT_AREA are defines (frame/structs.py). */
+#include "lib/math_lib.glsl"
 
-const float LIGHT_PI = 3.14159265358979;
-
-const int LIGHT_POINT = 0;
-const int LIGHT_SPOT = 1;
-const int LIGHT_SUN = 2;
-const int LIGHT_AREA = 3;
-
-/* The cone of a spot: smoothstep between its edge and the blend's inner cone, over the cosine in the light's object space.
- * `d` is the unit direction from the light. */
+/* The cone of a spot: smoothstep between its edge and the blend's inner cone, over the cosine in the light's object
+ * space. `d` is the unit direction from the light. */
 float light_spot_cone(Light light, vec3 d)
 {
   vec2 side = vec2(dot(d, light.axis_x), dot(d, light.axis_y)) * light.spot_stretch;
@@ -41,9 +35,9 @@ vec3 light_intensity(Light light, vec3 d)
   return light.intensity;
 }
 
-/* The mean of max(N . w, 0) / (a . w) over the projected solid angle of a round emitter about the direction a, N . a = `cosine`,
- * that fills the cone of squared sine `sine_squared` evenly: the cosine itself but where the horizon cuts the emitter
- * (Lagarde & de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014, listing 7). */
+/* The mean of max(N . w, 0) / (a . w) over the projected solid angle of a round emitter about the direction a,
+ * N . a = `cosine`, that fills the cone of squared sine `sine_squared` evenly: the cosine itself but where the horizon
+ * cuts the emitter (Lagarde & de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014, listing 7). */
 float light_round_cosine(float cosine, float sine_squared)
 {
   if (cosine * cosine >= sine_squared) {
@@ -53,7 +47,7 @@ float light_round_cosine(float cosine, float sine_squared)
   float x = sqrt(max(1.0 / min(sine_squared, 1.0) - 1.0, 1e-12));
   float y = clamp(-x * cosine / sine, -1.0, 1.0);
   float w = sine * sqrt(1.0 - y * y);
-  return max((cosine * acos(y) - x * w) / LIGHT_PI + atan(w / x) / (LIGHT_PI * sine_squared), 0.0);
+  return max((cosine * acos(y) - x * w) / MATH_PI + atan(w / x) / (MATH_PI * sine_squared), 0.0);
 }
 
 /* Irradiance / pi from a point or spot light, `source` one point of its emitter (lights.emitter_sample). */
@@ -61,10 +55,10 @@ vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
 {
   vec3 center = light.position - P;
   float squared = dot(center, center);
-  float radius_squared = light.blur_radius * light.blur_radius;
+  float radius_squared = light.emitter_radius * light.emitter_radius;
   bool disc = light.soft_radius_squared > 0.0;
   if (squared <= (disc ? 0.0 : radius_squared)) {
-    return disc || radius_squared == 0.0 ? vec3(0.0) : light.intensity / (radius_squared * LIGHT_PI);
+    return disc || radius_squared == 0.0 ? vec3(0.0) : light.intensity / (radius_squared * MATH_PI);
   }
   float inverse = inversesqrt(squared);
   vec3 axis = center * inverse;
@@ -73,7 +67,7 @@ vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
   place -= axis * dot(axis, place);
   vec3 w =
       disc ? normalize(center + place) : axis * sqrt(max(1.0 - dot(place, place) / squared, 0.0)) + place * inverse;
-  vec3 intensity = light_intensity(light, -w) / LIGHT_PI;
+  vec3 intensity = light_intensity(light, -w) / MATH_PI;
   if (light.filtered != 0 && light.kind == LIGHT_POINT) {
     float seen = squared + light.soft_radius_squared;
     return intensity * light_round_cosine(dot(N, axis), radius_squared / seen) / seen;
@@ -92,12 +86,12 @@ vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
 {
   if (light.kind == LIGHT_SUN) {
     if (light.filtered != 0) {
-      float tangent_squared = light.blur_radius * light.blur_radius;
+      float tangent_squared = light.emitter_radius * light.emitter_radius;
       float sine_squared = tangent_squared / (1.0 + tangent_squared);
-      return light.intensity * light_round_cosine(dot(N, light.axis_z), sine_squared) / LIGHT_PI;
+      return light.intensity * light_round_cosine(dot(N, light.axis_z), sine_squared) / MATH_PI;
     }
     /* Sources are even over the cone; a surface that faces the sun gets its whole strength at any angle. */
-    return light.intensity * max(dot(N, source), 0.0) * 2.0 / (LIGHT_PI * (1.0 + light.spot_cosine));
+    return light.intensity * max(dot(N, source), 0.0) * 2.0 / (MATH_PI * (1.0 + light.spot_cosine));
   }
   if (light.kind != LIGHT_AREA) {
     return light_round_unshadowed(light, P, N, source);
@@ -108,5 +102,5 @@ vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
     return vec3(0.0);
   }
   vec3 d = to_light * inversesqrt(squared);
-  return light_intensity(light, -d) * max(dot(N, d), 0.0) / (squared * LIGHT_PI);
+  return light_intensity(light, -d) * max(dot(N, d), 0.0) / (squared * MATH_PI);
 }

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...device.formats import FORMATS
 from ...device.interface import Device, Target, Texture
 from .maps import Atlas, Face, face_row
 from .structs import MAP_FACE
@@ -20,8 +21,9 @@ from .tables import replace_table
 if TYPE_CHECKING:
     from ...gpu_scene import GpuScene
 
-# Texels of one atlas: 4096 x 4096. More lights get smaller tiles, which the statistics say.
-TEXEL_BUDGET = 1 << 24
+# Memory of one atlas beyond which more lights get smaller tiles, which the statistics say.
+ATLAS_BYTES = 256 << 20
+DEPTH_FORMAT = "DEPTH32F"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,19 +59,18 @@ class LightMaps:
         self.face_table: Texture | None = None
         self.tiles: tuple[MapTile, ...] = ()
         self.drawn = 0  # tiles drawn since the beginning
-        self.wanted = 0
         self._slots: dict[Hashable, int] = {}
         self._drawn: dict[Hashable, tuple[bytes, int]] = {}  # fingerprint, revision of the scene
 
     def lay_out(self, tiles: Sequence[MapTile], wanted: int) -> None:
         """Give every tile a place, and upload the table of faces in the order of ``tiles``."""
         self.tiles = tuple(tiles)
-        self.wanted = wanted
         count = max(len(tiles), 1)
-        fitting = Atlas.fitting(count, wanted, TEXEL_BUDGET, self.device.max_texture_size)
+        texels = ATLAS_BYTES // sum(FORMATS[name].bytes for name in (*self.formats, DEPTH_FORMAT))
+        fitting = Atlas.fitting(count, wanted, texels, self.device.max_texture_size)
         if self.atlas is None or fitting.tile != self.atlas.tile or self.atlas.tiles < count:
             whole_rows = -(-count // fitting.columns) * fitting.columns
-            self._allocate(Atlas.fitting(whole_rows, wanted, TEXEL_BUDGET, self.device.max_texture_size))
+            self._allocate(Atlas.fitting(whole_rows, wanted, texels, self.device.max_texture_size))
         assert self.atlas is not None and self.target is not None
         keys = {tile.key for tile in tiles}
         for gone in self._slots.keys() - keys:
@@ -118,7 +119,7 @@ class LightMaps:
         self._slots.clear()
         self._drawn.clear()
         self.colors = tuple(self.device.texture(atlas.size, name) for name in self.formats)
-        self.depth = self.device.texture(atlas.size, "DEPTH32F")
+        self.depth = self.device.texture(atlas.size, DEPTH_FORMAT)
         self.target = self.device.target(self.colors, self.depth)
 
     def _free_textures(self) -> None:

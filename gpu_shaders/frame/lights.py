@@ -9,8 +9,8 @@ import numpy as np
 
 from ...scene.data import AreaShape, Light, LightKind
 from .maps import light_axes, spot_stretch
+from .structs import LIGHT_KINDS
 
-KINDS = {LightKind.POINT: 0, LightKind.SPOT: 1, LightKind.SUN: 2, LightKind.AREA: 3}
 ROUND = (AreaShape.DISK, AreaShape.ELLIPSE)
 # 1/g, 1/g^2, 1/g^3 with g the root of g^4 = g + 1: the R3 sequence (Roberts 2018).
 _R3 = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
@@ -103,19 +103,20 @@ def _sine_squared_quantile(u: float) -> float:
     return 0.5 * (low + high)
 
 
-def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int, face_count: int) -> dict:
-    """The LIGHT table row; ``source`` is the emitter point of this frame, ``filtered`` asks for PCSS instead."""
+def light_row(light: Light, source: np.ndarray | None, first_face: int, face_count: int) -> dict:
+    """The LIGHT table row; ``source`` is this sample's ``emitter_sample``, None the whole emitter, filtered."""
     axes = light_axes(light)
     center = np.asarray(light.world_from_light, np.float64)[:3, 3]
     half = half_size(light) if light.kind is LightKind.AREA else (0.0, 0.0)
     spot_cosine = math.cos(0.5 * (light.angle if light.kind is LightKind.SUN else light.spot_angle))
     is_disc = light.soft_falloff and light.kind in (LightKind.POINT, LightKind.SPOT)
     tangent, normalize = _spread(light)
-    if filtered:
+    filtered = source is None
+    if source is None:
         source = axes[:, 2] if light.kind is LightKind.SUN else center
     return {
         "position": center,
-        "kind": KINDS[light.kind],
+        "kind": LIGHT_KINDS[light.kind],
         "axis_x": axes[:, 0],
         "axis_y": axes[:, 1],
         "axis_z": axes[:, 2],
@@ -131,13 +132,13 @@ def light_row(light: Light, source: np.ndarray, filtered: bool, first_face: int,
         "half_size": half,
         "spread_tangent": tangent,
         "spread_normalize": normalize,
-        "blur_radius": _blur_radius(light, half),
+        "emitter_radius": _emitter_radius(light, half),
         "round_shape": int(light.area_shape in ROUND),
         "spot_stretch": spot_stretch(light),
     }
 
 
-def _blur_radius(light: Light, half: Sequence[float]) -> float:
+def _emitter_radius(light: Light, half: Sequence[float]) -> float:
     if light.kind is LightKind.SUN:
         return math.tan(0.5 * min(light.angle, 3.0))
     if light.kind is LightKind.AREA:

@@ -1,7 +1,7 @@
 """Declarations of the passes that every frame has."""
 
 from ...device.shader import Shader
-from .structs import INSTANCE, LIGHT, MAP_FACE, MATERIAL
+from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_FACE, MATERIAL
 
 MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3", "in_base_uv": "VEC2", "in_emission_uv": "VEC2"}
 MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3", "v_base_uv": "VEC2", "v_emission_uv": "VEC2"}
@@ -28,6 +28,7 @@ GBUFFER = Shader(
         "pc_material": "INT",
         "pc_holdout": "INT",
     },
+    defines=IMAGE_DEFINES,
 )
 
 SHADOW = Shader(
@@ -63,6 +64,7 @@ DIRECT = Shader(
     },
     structs=(LIGHT, MAP_FACE),
     constants={"pc_first_light": "INT", "pc_last_light": "INT", "pc_seed": "INT", "pc_sample": "INT"},
+    defines=LIGHT_DEFINES,
 )
 
 ACCUMULATE = Shader(

@@ -1,7 +1,7 @@
 /* Shadow maps without bias: a texel holds depth and the slope of its plane. The receiver is in shadow only when both
  * hold: the texel's plane, continued to the receiver's place, lies before the receiver; and the texel itself lies
- * before the receiver's plane continued to the texel's place. A point of one plane passes both tests as lit; the facets of a convex
- * body pass the second, the walls of a concave corner pass the first. */
+ * before the receiver's plane continued to the texel's place. A point of one plane passes both tests as lit; the facets
+ * of a convex body pass the second, the walls of a concave corner pass the first. */
 #include "frame/map_lib.glsl"
 #include "lib/sampling_lib.glsl"
 
@@ -73,8 +73,8 @@ float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
   return state == SHADOW_BLOCKED ? 0.0 : 1.0;
 }
 
-/* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter.
- * `radius` is the emitter's radius in metres, for a sun the tangent of half its angle. */
+/* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter
+ * over it. `radius` is the emitter's radius in metres, for a sun the tangent of half its angle. */
 float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, float radius,
                   vec2 noise)
 {

@@ -1,13 +1,20 @@
-"""Tables that the frame's shaders read: one declaration for numpy and for GLSL."""
+"""Tables that the frame's shaders read, and the numbers in them that have names: one declaration for numpy and GLSL."""
 
 from ...device.structs import Struct
+from ...scene.data import LightKind
+
+LIGHT_KINDS = {kind: number for number, kind in enumerate(LightKind)}
+IMAGE_CLOSEST, IMAGE_EXTEND = 1, 2  # bits of MATERIAL's modes
+
+LIGHT_DEFINES = tuple((f"LIGHT_{kind.name}", str(number)) for kind, number in LIGHT_KINDS.items())
+IMAGE_DEFINES = (("IMAGE_CLOSEST", str(IMAGE_CLOSEST)), ("IMAGE_EXTEND", str(IMAGE_EXTEND)))
 
 INSTANCE = Struct("Instance", world_from_object="mat4")
 
 MATERIAL = Struct(
     "Material",
     base_color="vec3",
-    base_mode="int",  # -1: no texture; else the IMAGE_* bits of image_lib.glsl
+    base_mode="int",  # -1: no texture; else IMAGE_* bits
     emission="vec3",  # radiance, W/(m² sr)
     emission_mode="int",
 )
@@ -15,7 +22,7 @@ MATERIAL = Struct(
 LIGHT = Struct(
     "Light",
     position="vec3",  # the emitter's centre
-    kind="int",  # LIGHT_* of light_lib.glsl
+    kind="int",  # LIGHT_KINDS
     axis_x="vec3",  # the light's own axes in the world, unit; it looks down -axis_z
     spot_cosine="float",  # cosine of half the cone; sun: of half its angle
     axis_y="vec3",
@@ -31,7 +38,7 @@ LIGHT = Struct(
     half_size="vec2",  # area: half extents, metres
     spread_tangent="float",  # area: tangent of half the spread, -1: none
     spread_normalize="float",
-    blur_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
+    emitter_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
     round_shape="int",  # area: 1 for disk and ellipse
     spot_stretch="vec2",  # the object's scale along Z over that along X and Y: it stretches a spot's cone
 )

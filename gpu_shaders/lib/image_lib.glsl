@@ -1,8 +1,5 @@
 /* Image lookups with the wrap and filter of the material, done by hand: Blender 4.5 and 5.0 cannot set them on a
- * texture. `mode` holds IMAGE_CLOSEST and IMAGE_EXTEND bits. */
-
-const int IMAGE_CLOSEST = 1;
-const int IMAGE_EXTEND = 2;
+ * texture. `mode` holds the bits IMAGE_CLOSEST and IMAGE_EXTEND (frame/structs.py). */
 
 /* `texel` is at least -size. */
 ivec2 image_wrap(ivec2 texel, ivec2 size, int mode)

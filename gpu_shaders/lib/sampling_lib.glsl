@@ -1,7 +1,7 @@
 /* Deterministic noise: every number depends on pixel, sample and dimension only, so that one input gives one picture.
  * Hash: pcg3d of Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020. */
+#include "lib/math_lib.glsl"
 
-const float SAMPLING_PI = 3.14159265358979;
 /* The R2 sequence (Roberts 2018): 1/g and 1/g^2 with g the plastic number, in parts of 2^32. */
 const uvec2 SAMPLING_R2 = uvec2(3242174889u, 2447445414u);
 
@@ -25,8 +25,8 @@ vec2 sampling_hash(ivec2 pixel, int seed)
   return vec2(bits.xy >> 8u) * (1.0 / 16777216.0);
 }
 
-/* Point `index` of the R2 sequence, shifted by a random offset in [0, 1) (Cranley-Patterson rotation). Integers keep it exact
- * however far it runs. */
+/* Point `index` of the R2 sequence, shifted by a random offset in [0, 1) (Cranley-Patterson rotation). Integers keep it
+ * exact however far it runs. */
 vec2 sampling_r2(int index, vec2 offset)
 {
   return fract(offset + vec2((SAMPLING_R2 * uint(index)) >> 8u) * (1.0 / 16777216.0));
@@ -36,6 +36,6 @@ vec2 sampling_r2(int index, vec2 offset)
 vec2 sampling_vogel_disc(int index, int count, float turn)
 {
   float radius = sqrt((float(index) + 0.5) / float(count));
-  float angle = float(index) * 2.39996322972865 + turn * 2.0 * SAMPLING_PI;
+  float angle = float(index) * 2.39996322972865 + turn * 2.0 * MATH_PI;
   return radius * vec2(cos(angle), sin(angle));
 }

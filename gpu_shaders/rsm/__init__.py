@@ -32,6 +32,8 @@ from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SH
 WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
 # Lookups of one pixel in one pass: Mesa's software renderer ends all loops of a shader after 65535 rounds, in silence.
 LONGEST_LOOP = 1 << 15
+# How far a sample is after maps and coarse grid, for the progress bar.
+MAPS_DONE, COARSE_DONE = 0.2, 0.6
 Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
@@ -136,22 +138,22 @@ class Rsm:
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> Iterator[float]:
         """Irradiance / pi of one bounce, added to ``target``; see ``Technique.indirect``."""
         for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
-            yield 0.2 * done
+            yield MAPS_DONE * done
         if not inputs.gpu_scene.scene.lights:
             return
         if settings["interpolation"] == "OFF":
             for done in self._gather(inputs, settings, target, self._none, 1, (0, 0)):
-                yield 0.2 + 0.8 * done
+                yield MAPS_DONE + (1.0 - MAPS_DONE) * done
             return
         stride = int(settings["interpolation"])
         offset = _grid_offset(inputs, stride)
         coarse, coarse_target = self._coarse_target(inputs, stride)
         self.device.clear(coarse_target)
         for done in self._gather(inputs, settings, coarse_target, self._none, stride, offset):
-            yield 0.2 + 0.4 * done
+            yield MAPS_DONE + (COARSE_DONE - MAPS_DONE) * done
         reused = self._interpolate(inputs, coarse, target, stride, offset)
         for done in self._gather(inputs, settings, target, reused, 1, (0, 0)):
-            yield 0.6 + 0.4 * done
+            yield COARSE_DONE + (1.0 - COARSE_DONE) * done
 
     def statistics(self) -> Mapping[str, float]:
         atlas = self.maps.atlas
@@ -220,7 +222,7 @@ class Rsm:
                 "rsm_face_tx": self.maps.face_table,
                 "pc_first_light": first,
                 "pc_last_light": last,
-                "pc_samples": gathers,
+                "pc_gathers": gathers,
                 "pc_radius": float(settings["radius"]),
                 "pc_tile": float(atlas.tile),
                 "pc_seed": inputs.noise_seed(1),
@@ -261,5 +263,5 @@ class Rsm:
 
 def _grid_offset(inputs: FrameInputs, stride: int) -> tuple[int, int]:
     """Where the coarse grid begins: another place every sample, so that its pattern averages out."""
-    x, y = np.random.default_rng((inputs.seed & 0xFFFF, inputs.sample)).integers(0, stride, 2)
+    x, y = np.random.default_rng((inputs.seed, inputs.sample)).integers(0, stride, 2)
     return int(x), int(y)

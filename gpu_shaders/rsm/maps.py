@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...device.interface import Device, Texture
-from ...scene.data import Light, Visibility
-from ..frame.draws import draw_shaded, visible_draws
+from ...scene.data import Visibility
+from ..frame.draws import draw_scene, material_of, visible_draws
 from ..frame.light_maps import LightMaps, MapTile
 from ..frame.lights import light_row
 from ..frame.maps import light_faces
@@ -18,7 +18,7 @@ from ..frame.tables import replace_table
 from .shaders import DRAW
 
 if TYPE_CHECKING:
-    from ...gpu_scene import GpuScene
+    from ...gpu_scene import Draw, GpuScene
 
 # What a light's picture does not depend on: where its tiles lie in the table of faces.
 _PLACE = {"first_face": 0}
@@ -72,7 +72,7 @@ class ReflectiveShadowMaps(LightMaps):
         rows = []
         for index, light in enumerate(gpu_scene.scene.lights):
             faces = light_faces(light, gpu_scene.boxes)
-            row = _center_row(light, len(tiles), len(faces))
+            row = light_row(light, None, len(tiles), len(faces))
             look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
             rows.append(row)
             tiles += [MapTile(light.key, index, face, look) for face in faces]
@@ -82,13 +82,19 @@ class ReflectiveShadowMaps(LightMaps):
     def _draw(self, gpu_scene: GpuScene, tile: MapTile) -> None:
         target, viewport = self.begin(tile, gpu_scene)
         draws = visible_draws(gpu_scene, Visibility.SHADOW | Visibility.BOUNCE, tile.face.sees)
-        draw_shaded(
+
+        def each(draw: Draw) -> dict:
+            return {"pc_reflects": int(bool(draw.visibility & Visibility.BOUNCE)), **material_of(gpu_scene, draw)}
+
+        draw_scene(
             self.device,
             gpu_scene,
             DRAW,
             target,
             draws,
+            each,
             viewport,
+            material_tx=gpu_scene.material_table,
             light_tx=self.light_table,
             pc_clip_from_world=tile.face.clip_from_world,
             pc_light=tile.light,
@@ -102,7 +108,3 @@ class ReflectiveShadowMaps(LightMaps):
     def _served_by(self, tile: MapTile) -> int:
         """Index of the face whose part of the scene this tile leaves to it: a sun's far face has a near one. Or -1."""
         return self.tiles.index(tile) - 1 if tile.face.name == "Far" else -1
-
-
-def _center_row(light: Light, first_face: int, face_count: int) -> dict:
-    return light_row(light, np.zeros(3), True, first_face, face_count)

@@ -1,11 +1,12 @@
-/* One texel of a reflective shadow map (Dachsbacher & Stamminger 2005, section 3): where the light falls, how the surface
- * lies there, and the flux it sends back. The flux takes the light through the texel times the albedo; the receiver's cosine is not in
- * it: it cancels against the surface's projected area. */
+/* One texel of a reflective shadow map (Dachsbacher & Stamminger 2005, section 3): where the light falls, how the
+ * surface lies there, and the flux it sends back. The flux takes the light through the texel times the albedo; the
+ * receiver's cosine is not in it: it cancels against the surface's projected area. */
 #include "frame/light_lib.glsl"
 #include "frame/map_lib.glsl"
 #include "frame/surface_lib.glsl"
 
-/* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond this. */
+/* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond
+ * this cosine. */
 const float RSM_GRAZING = 1e-2;
 
 void main()

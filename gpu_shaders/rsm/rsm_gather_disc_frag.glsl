@@ -7,7 +7,6 @@
  *            whole map and both halves weighted by the balance heuristic (Veach & Guibas 1995), so that the radius
  *            changes the noise and not the level. */
 #include "frame/map_lib.glsl"
-#include "lib/octahedron_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "rsm/rsm_lib.glsl"
 
@@ -31,13 +30,13 @@ vec3 gather_fetch(Gather g, int face_index, vec2 uv)
   }
   MapFace face = map_face_fetch(rsm_face_tx, face_index);
   ivec2 texel = ivec2(face.origin + floor(uv * face.tile));
-  return rsm_texel_irradiance(texel, rsm_position_tx, rsm_normal_tx, rsm_flux_tx, g.P, g.N);
+  return rsm_texel_light(texel, rsm_position_tx, rsm_normal_tx, rsm_flux_tx, g.P, g.N);
 }
 
 /* Tile coordinates of disc sample xi around the receiver's place. */
 vec2 gather_disc_uv(Gather g, vec2 xi)
 {
-  float angle = 2.0 * SAMPLING_PI * xi.y;
+  float angle = 2.0 * MATH_PI * xi.y;
   return g.place + pc_radius * xi.x * vec2(sin(angle), cos(angle));
 }
 
@@ -45,22 +44,22 @@ vec2 gather_disc_uv(Gather g, vec2 xi)
 vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < pc_samples; i++) {
-    vec2 xi = sampling_r2(pc_sample * pc_samples + i, shift);
+  for (int i = 0; i < pc_gathers; i++) {
+    vec2 xi = sampling_r2(pc_sample * pc_gathers + i, shift);
     sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
   }
-  float texels = SAMPLING_PI * pc_radius * pc_radius * pc_tile * pc_tile;
-  return sum * texels / (GATHER_PUBLISHED_MEAN * float(pc_samples));
+  float texels = MATH_PI * pc_radius * pc_radius * pc_tile * pc_tile;
+  return sum * texels / (GATHER_PUBLISHED_MEAN * float(pc_gathers));
 }
 #else
 vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
-  int in_disc = int(GATHER_DISC_SHARE * float(pc_samples));
-  float share = float(in_disc) / float(pc_samples);
-  for (int i = 0; i < pc_samples; i++) {
+  int in_disc = int(GATHER_DISC_SHARE * float(pc_gathers));
+  float share = float(in_disc) / float(pc_gathers);
+  for (int i = 0; i < pc_gathers; i++) {
     bool disc = i < in_disc;
-    int index = disc ? pc_sample * in_disc + i : pc_sample * (pc_samples - in_disc) + i - in_disc;
+    int index = disc ? pc_sample * in_disc + i : pc_sample * (pc_gathers - in_disc) + i - in_disc;
     vec2 xi = sampling_r2(index, disc ? shift : fract(shift.yx + 0.5));
     int face = g.face;
     vec2 uv;
@@ -72,12 +71,11 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
       uv = vec2(fract(pick), xi.y);
     }
     float r = distance(uv, g.place);
-    float in_disc_density =
-        face == g.face && r < pc_radius ? 1.0 / (2.0 * SAMPLING_PI * max(r, 1e-6) * pc_radius) : 0.0;
+    float in_disc_density = face == g.face && r < pc_radius ? 1.0 / (2.0 * MATH_PI * max(r, 1e-6) * pc_radius) : 0.0;
     float density = share * in_disc_density + (1.0 - share) / float(face_count);
     sum += gather_fetch(g, face, uv) / density;
   }
-  return sum * pc_tile * pc_tile / float(pc_samples);
+  return sum * pc_tile * pc_tile / float(pc_gathers);
 }
 #endif
 
@@ -85,17 +83,13 @@ void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy) * pc_stride + pc_offset;
   out_indirect = vec4(0.0);
-  /* The last pixels of a coarse grid may lie beyond the picture. */
-  if (any(greaterThanEqual(pixel, textureSize(position_tx, 0)))) {
-    return;
-  }
-  vec4 position = texelFetch(position_tx, pixel, 0);
-  if (position.w == 0.0 || rsm_reused(reused_tx, ivec2(gl_FragCoord.xy))) {
+  RsmReceiver receiver = rsm_receiver(pixel, ivec2(gl_FragCoord.xy), position_tx, normal_tx, reused_tx);
+  if (!receiver.gathers) {
     return;
   }
   Gather g;
-  g.P = position.xyz;
-  g.N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
+  g.P = receiver.P;
+  g.N = receiver.N;
   vec3 sum = vec3(0.0);
   for (int i = pc_first_light; i < pc_last_light; i++) {
     Light light = light_fetch(light_tx, i);

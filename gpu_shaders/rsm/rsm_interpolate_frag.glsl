@@ -1,5 +1,6 @@
-/* Screen-space interpolation (Dachsbacher & Stamminger 2005, section 4.2): where at least three of the four coarse pixels around lie
- * on about the same plane with about the same normal, their irradiance is reused; elsewhere the pixel gathers for itself. */
+/* Screen-space interpolation (Dachsbacher & Stamminger 2005, section 4.2): where at least three of the four coarse
+ * pixels around lie on about the same plane with about the same normal, their irradiance is reused; elsewhere the pixel
+ * gathers for itself. */
 #include "lib/octahedron_lib.glsl"
 
 const float INTERPOLATE_NORMAL = 0.9;

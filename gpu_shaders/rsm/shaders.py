@@ -2,7 +2,7 @@
 
 from ...device.shader import Shader
 from ..frame.shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
-from ..frame.structs import INSTANCE, LIGHT, MAP_FACE, MATERIAL
+from ..frame.structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_FACE, MATERIAL
 
 DRAW = Shader(
     name="rsm_draw",
@@ -24,6 +24,7 @@ DRAW = Shader(
         "pc_texel_measure": "FLOAT",  # see rsm_draw_frag.glsl
         "pc_served": "INT",
     },
+    defines=(*LIGHT_DEFINES, *IMAGE_DEFINES),
     depth_write=True,
 )
 
@@ -57,7 +58,7 @@ def _gather_disc(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
             **_GRID,
             "pc_first_light": "INT",
             "pc_last_light": "INT",
-            "pc_samples": "INT",
+            "pc_gathers": "INT",
             "pc_radius": "FLOAT",
             "pc_tile": "FLOAT",
             "pc_seed": "INT",

@@ -155,7 +155,7 @@ LIB = ["frame/light_lib.glsl"]
 
 
 def row(lamp, source=None, filtered=False):
-    return light_row(lamp, np.zeros(3) if source is None else source, filtered, 0, 0)
+    return light_row(lamp, None if filtered else np.zeros(3) if source is None else source, 0, 0)
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (2, 0.7, 1.3)])
