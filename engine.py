@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 import bpy
 
+from . import ENGINE_ID
 from .device.blender import unbind
 from .device.interface import DeviceError
 from .final_render import render as render_final
@@ -29,7 +30,7 @@ USER_FAULTS = (SceneError, RenderError, DeviceError, MainThreadError)
 class ReboundEngine(bpy.types.RenderEngine):
     """Rebound for Blender. Its objects come and go as Blender likes; the state is in a Viewport or a final render."""
 
-    bl_idname = "REBOUND"
+    bl_idname = ENGINE_ID
     bl_label = "Rebound"
     bl_use_preview = True
     bl_use_eevee_viewport = True  # Material Preview mode is drawn by EEVEE, with its own studio lights
@@ -40,7 +41,8 @@ class ReboundEngine(bpy.types.RenderEngine):
     missing_gpu = ""  # why there is no GPU in background, see _stand_down_without_gpu
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        register_passes(self, scene, renderlayer)
+        with _boundary(self._fail):
+            register_passes(self, scene, renderlayer)
 
     def render(self, depsgraph):
         with _boundary(self._fail):
@@ -49,14 +51,18 @@ class ReboundEngine(bpy.types.RenderEngine):
             render_final(self, depsgraph)
 
     def view_update(self, context, depsgraph):
-        viewport = self._viewport()
-        with _boundary(viewport.fail):
-            viewport.update(context, depsgraph)
+        with _boundary(self._fail_view):
+            self._viewport().update(context, depsgraph)
 
     def view_draw(self, context, depsgraph):
+        with _boundary(self._fail_view):
+            self._viewport().draw(context, depsgraph)
+        with _boundary(self._fail_view):
+            self._show_state(context)
+
+    def _show_state(self, context) -> None:
+        """What stands over the picture, and whether Blender is to come again."""
         viewport = self._viewport()
-        with _boundary(viewport.fail):
-            viewport.draw(context, depsgraph)
         viewport.draw_error(context)
         self.update_stats("", viewport.progress)
         if viewport.unfinished:
@@ -69,6 +75,13 @@ class ReboundEngine(bpy.types.RenderEngine):
             # Blender destroys an engine object on any thread, mostly without a GPU context.
             weakref.finalize(self, MAIN_THREAD.later, self.viewport.session.free).atexit = False
         return self.viewport
+
+    def _fail_view(self, message: str) -> None:
+        viewport = getattr(self, "viewport", None)
+        if viewport is None:  # it could not be made
+            self._fail(message)
+        else:
+            viewport.fail(message)
 
     def _fail(self, message: str) -> None:
         """An error that is reported (not raised, not error_set) makes Blender cancel: no picture is written."""

@@ -16,13 +16,14 @@ from types import FrameType
 
 import bpy
 
-ENGINE = "REBOUND"
+from . import ENGINE_ID
+
 FAILED = 1
 
 
 @bpy.app.handlers.persistent
 def _on_render_cancel(scene, _depsgraph=None) -> None:
-    if bpy.app.background and not _driven_by_python(sys._getframe()) and scene.render.engine == ENGINE:
+    if bpy.app.background and not _driven_by_python(sys._getframe()) and scene.render.engine == ENGINE_ID:
         atexit.unregister(_leave)  # once is enough
         atexit.register(_leave, bpy.app.tempdir)
 

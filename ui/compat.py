@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-ENGINE = "REBOUND"
+from .. import ENGINE_ID
 
 # Panels of every engine whose contents Rebound does not read.
 EXCLUDED = frozenset({
@@ -45,10 +45,10 @@ def _all_panels() -> list[type]:
 
 def register() -> None:
     for panel in compatible_panels():
-        panel.COMPAT_ENGINES.add(ENGINE)
+        panel.COMPAT_ENGINES.add(ENGINE_ID)
 
 
 def unregister() -> None:
     for panel in _all_panels():
         if not panel.__module__.startswith(__package__ or ""):
-            panel.COMPAT_ENGINES.discard(ENGINE)
+            panel.COMPAT_ENGINES.discard(ENGINE_ID)

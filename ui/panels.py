@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import bpy
 
+from .. import ENGINE_ID
 from ..gpu_shaders import TECHNIQUES
 from ..gpu_shaders.technique import Setting
 from ..passes import PASSES
-from ..render_result import view_layer_property
 from ..session import SESSIONS
-from ..settings import SETTINGS, named_settings
+from ..settings import named_settings
 
-ENGINE = "REBOUND"
 SAMPLING = ("samples", "seed")
 SHADOWS = ("shadow_resolution", "soft_shadows")
 
@@ -22,7 +21,7 @@ class ReboundPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    COMPAT_ENGINES = {ENGINE}
+    COMPAT_ENGINES = {ENGINE_ID}
 
     @classmethod
     def poll(cls, context):
@@ -67,21 +66,6 @@ class REBOUND_PT_shadows(ReboundPanel, bpy.types.Panel):
 
     def draw(self, context):
         _draw_settings(self.layout, context.scene.rebound, _named(SHADOWS))
-
-
-class REBOUND_PT_other(ReboundPanel, bpy.types.Panel):
-    """Settings that no panel above names, so that a new one is never without a place."""
-
-    bl_label = "Other"
-    bl_options = {"DEFAULT_CLOSED"}
-    settings = [(s.name, s) for s in SETTINGS if s.name not in (*SAMPLING, *SHADOWS, "method")]
-
-    @classmethod
-    def poll(cls, context):
-        return bool(cls.settings) and super().poll(context)
-
-    def draw(self, context):
-        _draw_settings(self.layout, context.scene.rebound, self.settings)
 
 
 class REBOUND_PT_film(ReboundPanel, bpy.types.Panel):
@@ -168,14 +152,13 @@ class REBOUND_PT_passes(ReboundPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         column = layout.column(align=True)
         for p in PASSES:
-            column.prop(context.view_layer, view_layer_property(p), text=p.label)
+            column.prop(context.view_layer, p.view_layer_property, text=p.label)
 
 
 CLASSES = (
     REBOUND_PT_sampling,
     REBOUND_PT_indirect,
     REBOUND_PT_shadows,
-    REBOUND_PT_other,
     REBOUND_PT_film,
     REBOUND_PT_status,
     REBOUND_PT_debug,

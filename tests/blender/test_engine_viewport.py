@@ -215,3 +215,57 @@ def test_time_for_one_redraw_is_bounded(view, monkeypatch):
     before = view.picture.samples
     view.draw()
     assert view.picture.samples == before
+
+
+class EngineObject:
+    """A RenderEngine's callbacks on an object that Blender did not make."""
+
+    view_update, view_draw = engine.ReboundEngine.view_update, engine.ReboundEngine.view_draw
+    update_render_passes = engine.ReboundEngine.update_render_passes
+    _viewport, _show_state = engine.ReboundEngine._viewport, engine.ReboundEngine._show_state
+    _fail_view, _fail = engine.ReboundEngine._fail_view, engine.ReboundEngine._fail
+
+    def __init__(self):
+        self.reports: list[str] = []
+
+    def report(self, _kind, message):
+        self.reports.append(message)
+
+    def update_stats(self, _stats, _info):
+        pass
+
+
+def broken(*_args):
+    raise ZeroDivisionError("made by the test")
+
+
+@pytest.mark.parametrize("what", ["rebound.viewport.Viewport.draw_error", "rebound.viewport.Viewport.draw"])
+def test_no_error_gets_past_a_redraw(rebound_scene, monkeypatch, caplog, what):
+    made, context = EngineObject(), View(rebound_scene).context
+    monkeypatch.setattr(what, broken)
+    monkeypatch.setattr(Viewport, "update", lambda *_: None)
+    if what.endswith("draw"):
+        monkeypatch.setattr(Viewport, "draw_error", lambda *_: None)
+    made.view_update(context, bpy.context.evaluated_depsgraph_get())
+    made.view_draw(context, bpy.context.evaluated_depsgraph_get())
+    assert "ZeroDivisionError" in made._viewport().error
+    assert [record.exc_info[0] for record in caplog.records] == [ZeroDivisionError]
+
+
+def test_no_error_gets_past_statistics_and_making_a_viewport(rebound_scene, monkeypatch):
+    made, context = EngineObject(), View(rebound_scene).context
+    monkeypatch.setattr(EngineObject, "update_stats", broken)
+    made.view_draw(context, bpy.context.evaluated_depsgraph_get())
+    assert "ZeroDivisionError" in made._viewport().error
+    monkeypatch.setattr(engine, "Viewport", broken)
+    unmade = EngineObject()
+    unmade.view_update(context, None)
+    unmade.view_draw(context, None)
+    assert unmade.reports and all("ZeroDivisionError" in line for line in unmade.reports)
+
+
+def test_no_error_gets_past_the_registration_of_passes(monkeypatch):
+    made = EngineObject()
+    monkeypatch.setattr(engine, "register_passes", broken)
+    made.update_render_passes(None, None)
+    assert len(made.reports) == 1 and "ZeroDivisionError" in made.reports[0]
