@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
+import rebound
 from rebound.tests.blender import vulkan_backend
 
 # A user folder of their own keeps the developer's preferences and add-ons out of the tests. Set before bpy starts.
@@ -83,3 +84,11 @@ def clean_scene(gpu_backend) -> Iterator:
     """An empty file with factory settings; the scene of it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     yield bpy.context.scene
+
+
+@pytest.fixture
+def registered(clean_scene) -> Iterator:
+    """The extension enabled in an empty file, and disabled again however the test ends."""
+    rebound.register()
+    yield clean_scene
+    rebound.unregister()

@@ -10,7 +10,6 @@ import pytest
 import rebound
 from rebound import engine as engine_module
 from rebound.passes import PASSES
-from rebound.render_result import view_layer_property
 from rebound.session import SESSIONS, Session
 from rebound.tests.support.engine_build import HEIGHT, WIDTH, channels, picture, rebound_scene, render
 
@@ -22,10 +21,9 @@ NEW_NAMES = ["Combined", "Depth", "Normal", "Position", "Diffuse Direct", "Diffu
 NAMES = OLD_NAMES if bpy.app.version < (5, 0) else [*NEW_NAMES, "Emission", "Environment"]
 
 
-def test_register_twice_and_unregister_twice_leave_nothing(clean_scene):
+def test_register_twice_and_unregister_twice_leave_nothing(registered):
     rebound.register()
-    rebound.register()
-    assert clean_scene.rebound.samples == 64
+    assert registered.rebound.samples == 64
     rebound.unregister()
     rebound.unregister()
     assert not hasattr(bpy.types.Scene, "rebound")
@@ -58,7 +56,7 @@ def test_only_wanted_passes_are_in_the_file(rebound_scene, tmp_path):
 
 def test_every_pass_is_filled(rebound_scene, tmp_path):
     for entry in PASSES:
-        setattr(rebound_scene.view_layers[0], view_layer_property(entry), True)
+        setattr(rebound_scene.view_layers[0], entry.view_layer_property, True)
     found = render(rebound_scene, tmp_path / "a.exr")
     assert {name.split(".")[1] for name in found} == set(NAMES)
     assert all(np.isfinite(pixels).all() for pixels in found.values())
@@ -76,7 +74,7 @@ def test_every_pass_is_filled(rebound_scene, tmp_path):
 
 def test_compositor_knows_the_passes(rebound_scene):
     for entry in PASSES:
-        setattr(rebound_scene.view_layers[0], view_layer_property(entry), True)
+        setattr(rebound_scene.view_layers[0], entry.view_layer_property, True)
     if bpy.app.version >= (5, 0):
         tree = rebound_scene.compositing_node_group = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")
     else:

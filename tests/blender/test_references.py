@@ -5,15 +5,13 @@ from pathlib import Path
 import bpy
 import pytest
 
-import rebound
 from rebound.tests.support.engine_build import render
 from rebound.tests.support.scoring import diffuse, energy, read_passes, relative_squared_error
 
 
 @pytest.fixture
-def render_shared(clean_scene, shared_dir, tmp_path):
+def render_shared(registered, shared_dir, tmp_path):
     """Render a shared scene with Rebound; gives its passes and those of its reference."""
-    rebound.register()
 
     def run(name: str, reference: str, **settings):
         bpy.ops.wm.open_mainfile(filepath=str(shared_dir / "scenes" / "basic" / f"{name}.blend"))
@@ -28,8 +26,7 @@ def render_shared(clean_scene, shared_dir, tmp_path):
         truth = read_passes(Path(shared_dir) / "references" / f"{name}.{reference}.exr")
         return truth, read_passes(tmp_path / f"{name}.exr")
 
-    yield run
-    rebound.unregister()
+    return run
 
 
 def show(what: str, truth, test) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Every light against Cycles: the direct radiance of a white plane, within 1 % where it is bright."""
+"""Every light against Cycles: the direct radiance of a white plane, as the formulas have it and as Rebound renders it."""
 
 import math
 
@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from rebound.scene.convert import convert_scene
+from rebound.tests.support import engine_build
 from rebound.tests.support.blender_build import link, mesh, shader_material
 from rebound.tests.support.light_reference import irradiance
+from rebound.tests.support.scoring import diffuse, read_passes
 
 pytestmark = pytest.mark.slow
 
@@ -140,3 +142,32 @@ def test_light_matches_cycles(name, tmp_path):
     # Measured: 0.0013 over the picture and 0.004 of the brightest cell, 0.007 where a hard cone's edge crosses it.
     assert ours.sum() == pytest.approx(cycles.sum(), rel=0.005)
     assert error.max() <= 0.01 * cycles.max()
+
+
+# One light of every kind and shape; the spot's cone ends inside the picture.
+RENDERED = ("point", "spot_blend", "sun", "area_square", "area_rectangle", "area_disk", "area_ellipse")
+REBOUND_SAMPLES = 64
+
+
+def render_rebound(scene, path):
+    """(SIZE, SIZE, 3) radiance of direct diffuse light, row 0 at the bottom."""
+    scene.render.engine = "REBOUND"
+    scene.rebound.method, scene.rebound.samples = "NONE", REBOUND_SAMPLES
+    layer = scene.view_layers[0]
+    layer.use_pass_diffuse_direct = layer.use_pass_diffuse_color = True
+    engine_build.render(scene, path)
+    return diffuse(read_passes(path), "Direct")[::-1].astype(np.float64)
+
+
+@pytest.mark.parametrize("name", RENDERED)
+def test_rendered_light_matches_cycles(registered, name, tmp_path):
+    scene = build(CASES[name])
+    cycles = cells(render_cycles(scene, tmp_path / "cycles.exr"))
+    ours = cells(render_rebound(scene, tmp_path / "rebound.exr"))
+    total, error = ours.sum() / cycles.sum(), np.abs(ours - cycles).max() / cycles.max()
+    lit = cycles > 0.1 * cycles.max()
+    relative = (np.abs(ours - cycles)[lit] / cycles[lit]).max()
+    print(f"\n{name}: sum {total:.4f}, largest error {error:.4f} of the brightest cell,"  # noqa: T201  for pytest -s
+          f" {relative:.4f} of its own cell where that is lit")  # fmt: skip
+    assert total == pytest.approx(1.0, abs=0.01)
+    assert error <= 0.02 and relative <= 0.02

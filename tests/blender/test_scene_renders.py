@@ -4,7 +4,6 @@ import bpy
 import numpy as np
 import pytest
 
-import rebound
 from rebound.tests.support.engine_build import picture, render
 
 # Lit by emissive surfaces and the world only, which this version shows but takes no light from: dark, with a warning.
@@ -14,8 +13,7 @@ REAL = ["classroom", "cornell_box", "kitchen", "living_room", "wooden_staircase"
 
 
 @pytest.mark.parametrize("path", [*(f"basic/{name}" for name in BASIC), *(f"{name}/{name}" for name in REAL)])
-def test_shared_scene_renders(clean_scene, shared_dir, tmp_path, path, caplog, capfd):
-    rebound.register()
+def test_shared_scene_renders(registered, shared_dir, tmp_path, path, caplog, capfd):
     bpy.ops.wm.open_mainfile(filepath=str(shared_dir / "scenes" / f"{path}.blend"))
     scene = bpy.context.scene
     scene.render.engine = "REBOUND"
@@ -24,7 +22,6 @@ def test_shared_scene_renders(clean_scene, shared_dir, tmp_path, path, caplog, c
     scene.rebound.samples = 1
     scene.rebound.shadow_resolution = 512
     image = picture(render(scene, tmp_path / "scene.exr"), scene.view_layers[0].name)
-    rebound.unregister()
     assert image.shape == (90, 160, 4)
     assert np.isfinite(image).all()
     assert not [record for record in caplog.records if record.levelname == "ERROR"]

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import bpy
 import numpy as np
 import OpenEXR
 import pytest
 
-import rebound
 from rebound.tests.support.blender_build import CUBE, QUAD, link, material, mesh
 
 WIDTH, HEIGHT = 48, 32
 
 
 @pytest.fixture
-def rebound_scene(clean_scene) -> Iterator:
+def rebound_scene(registered):
     """A small lit scene with its camera, set to render with Rebound: one sample, 48 x 32 pixels."""
-    rebound.register()
-    fill_scene(clean_scene)
-    yield clean_scene
-    rebound.unregister()
+    fill_scene(registered)
+    return registered
 
 
 def fill_scene(scene) -> None:
