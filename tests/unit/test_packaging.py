@@ -54,3 +54,11 @@ def test_wheels_are_the_versions_that_are_tested():
 def test_tagline_fits_blenders_limits():
     assert len(MANIFEST["tagline"]) <= 64
     assert MANIFEST["tagline"][-1].isalnum()
+
+
+def test_every_module_logs_as_rebound():
+    """An installed extension is bl_ext.<repository>.rebound: a logger named after the module would be no child of ours."""
+    sources = [p for p in ROOT.rglob("*.py") if not {"tests", "tools", "examples"} & set(p.relative_to(ROOT).parts)]
+    sources = [p for p in sources if not any(part.startswith(".") for part in p.relative_to(ROOT).parts)]
+    assert len(sources) > 40
+    assert not [str(p) for p in sources if "getLogger(__name__)" in p.read_text()]

@@ -22,7 +22,7 @@ inside=${work#"${tree%/}"}
 mkdir "$work/rebound" "$work/out"
 for entry in "$root"/*; do
     case $(basename "$entry") in
-    dist | docs | out | tests | tools | wheels | benchmarks) ;;
+    dist | docs | out | tests | tools | wheels) ;;
     *) cp -r "$entry" "$work/rebound/" ;;
     esac
 done
