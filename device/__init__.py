@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """The only folder that calls the GPU: one shader declaration on Blender's gpu module and on a standalone context.
 
 ``BlenderDevice`` is in ``.blender``, ``HeadlessDevice`` in ``.headless``; neither is imported here.

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Values of a draw turned into what a GPU takes, the same way for every backend."""
 
 import operator

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's device: the gpu module of Blender 4.5 to 5.2, on OpenGL and Vulkan (Metal: by its rules, untried).
 
 What the versions do differently stays in this file. It needs a GPU context: inside a RenderEngine callback, an operator

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender cannot upload or read back itself, done by a draw: integers, volumes and arrays."""
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's shader compile errors: caught from the console, where alone it prints them, and traced to file and line.
 
 Blender 5 prints ":4:20: Error: text" or "python_shader.glsl:4:20: Error: text", counting in the source it was given.

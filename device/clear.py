@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """The shader that clears a part of a target."""
 
 from .shader import Shader

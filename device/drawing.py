@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Draws: the names and kinds of what they are given are checked here, once for all backends."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Texture formats that every backend creates, fills and reads back rightly, and their numpy side."""
 
 from dataclasses import dataclass

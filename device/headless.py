@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """The standalone device: moderngl on an OpenGL 4.3 context of its own, with no window and no Blender.
 
 For tests. Never in Blender's own process: Blender's gpu calls would then run in this context. A 24 bit

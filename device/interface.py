@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What a device can do: the same few methods on Blender's gpu module and on a standalone OpenGL context.
 
 A backend (blender.py, headless.py) supplies the underscored methods at the end of ``Device``; names, shapes and formats

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What may be a name in GLSL, in every supported Blender version and on every backend."""
 
 import re

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What a device makes and is told: textures, targets, vertices, the state of a draw."""
 
 import math

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """A shader declared once, in Python: its stages, resources and constants. The GLSL files hold mathematics only.
 
 The same declaration is compiled by the Blender device (blender.py) and the standalone one (headless.py); this module

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """GLSL text: includes resolved, every line traced to its file, and the rule kept that declarations live in Python."""
 
 import re

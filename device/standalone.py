@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Complete GLSL 4.30 core texts from a Shader: for moderngl, and for checking with glslangValidator."""
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """A struct written once: the numpy bytes and the GLSL that reads them.
 
 A ``Struct`` is packed in declaration order into whole vec4 texels, by the rules of std140 (source: OpenGL 4.6

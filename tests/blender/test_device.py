@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """The device contract on Blender's device, on the backend that the run asked for."""
 
 import weakref

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What every device must do: data that arrives. Run by tests/headless and by tests/blender.
 
 Expected pictures are closed forms in numpy; a test gets its device from the fixture ``device``.

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What every device must do when it draws. Run by tests/headless and by tests/blender; see device_contract.py."""
 
 import numpy as np

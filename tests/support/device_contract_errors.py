@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """What every device must refuse, and how it names what is wrong. See device_contract.py."""
 
 import numpy as np

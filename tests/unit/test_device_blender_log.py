@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Tracing compile logs, as each Blender version was seen to print them, to the project's file and line."""
 
 import os

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Shader declarations and the text made of them, without a GPU."""
 
 import dataclasses

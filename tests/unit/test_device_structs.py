@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """Struct: layout, packing and the GLSL it writes, without a GPU (device_contract.py reads it back on one)."""
 
 import numpy as np
