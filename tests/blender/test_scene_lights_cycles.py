@@ -1,4 +1,4 @@
-"""Every light against Cycles: the direct radiance of a white plane, as the formulas have it and as Rebound renders it."""
+"""Every light against Cycles: the direct radiance of a white plane, by the formulas and as Rebound renders it."""
 
 import math
 

@@ -57,7 +57,7 @@ def test_tagline_fits_blenders_limits():
 
 
 def test_every_module_logs_as_rebound():
-    """An installed extension is bl_ext.<repository>.rebound: a logger named after the module would be no child of ours."""
+    """An installed extension is bl_ext.<repository>.rebound: a logger of a module's name would be no child of ours."""
     sources = [p for p in ROOT.rglob("*.py") if not {"tests", "tools", "examples"} & set(p.relative_to(ROOT).parts)]
     sources = [p for p in sources if not any(part.startswith(".") for part in p.relative_to(ROOT).parts)]
     assert len(sources) > 40
