@@ -1,4 +1,4 @@
-#include "frame/light_lib.glsl"
+#include "frame/light_map_lib.glsl"
 #include "frame/shadow_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 
@@ -27,12 +27,7 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   if (light.face_count == 0) {
     return 1.0;
   }
-  vec3 d = P - light.map_origin;
-  vec3 local = vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z));
-  MapFace face = map_face_fetch(face_tx, light.first_face + map_face_of(light.face_count, local));
-  if (light.face_count == 2 && !map_holds(face, map_position(face, P))) {
-    face = map_face_fetch(face_tx, light.first_face + 1);
-  }
+  MapFace face = map_face_fetch(face_tx, light_map_face(light, face_tx, P));
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
   bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;
   vec3 p = map_position(face, P);

@@ -6,8 +6,7 @@
  * space. `d` is the unit direction from the light. */
 float light_spot_cone(Light light, vec3 d)
 {
-  vec2 side = vec2(dot(d, light.axis_x), dot(d, light.axis_y)) * light.spot_stretch;
-  float cosine = -normalize(vec3(side, dot(d, light.axis_z))).z;
+  float cosine = -normalize(vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z))).z;
   float t = clamp((cosine - light.spot_cosine) * light.spot_smooth, 0.0, 1.0);
   return cosine <= light.spot_cosine ? 0.0 : t * t * (3.0 - 2.0 * t);
 }

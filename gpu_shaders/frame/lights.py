@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...scene.data import AreaShape, Light, LightKind
-from .maps import light_axes, spot_stretch
+from .maps import light_axes
 from .structs import LIGHT_KINDS
 
 ROUND = (AreaShape.DISK, AreaShape.ELLIPSE)
@@ -107,6 +107,7 @@ def light_row(light: Light, source: np.ndarray | None, first_face: int, face_cou
     """The LIGHT table row; ``source`` is this sample's ``emitter_sample``, None the whole emitter, filtered."""
     axes = light_axes(light)
     center = np.asarray(light.world_from_light, np.float64)[:3, 3]
+    rows = _object_from_world(light) if light.kind is LightKind.SPOT else axes.T
     half = half_size(light) if light.kind is LightKind.AREA else (0.0, 0.0)
     spot_cosine = math.cos(0.5 * (light.angle if light.kind is LightKind.SUN else light.spot_angle))
     is_disc = light.soft_falloff and light.kind in (LightKind.POINT, LightKind.SPOT)
@@ -117,9 +118,9 @@ def light_row(light: Light, source: np.ndarray | None, first_face: int, face_cou
     return {
         "position": center,
         "kind": LIGHT_KINDS[light.kind],
-        "axis_x": axes[:, 0],
-        "axis_y": axes[:, 1],
-        "axis_z": axes[:, 2],
+        "axis_x": rows[0],
+        "axis_y": rows[1],
+        "axis_z": rows[2],
         "spot_cosine": spot_cosine,
         "spot_smooth": 1.0 / max((1.0 - spot_cosine) * light.spot_blend, 1e-7),
         "soft_radius_squared": light.radius**2 if is_disc else 0.0,
@@ -127,15 +128,22 @@ def light_row(light: Light, source: np.ndarray | None, first_face: int, face_cou
         "face_count": face_count,
         "source": source,
         "first_face": first_face,
-        "map_origin": center if filtered or light.kind is LightKind.SUN else source,
         "filtered": int(filtered),
         "half_size": half,
         "spread_tangent": tangent,
         "spread_normalize": normalize,
         "emitter_radius": _emitter_radius(light, half),
         "round_shape": int(light.area_shape in ROUND),
-        "spot_stretch": spot_stretch(light),
     }
+
+
+def _object_from_world(light: Light) -> np.ndarray:
+    """(3, 3) to the directions of the light's object space, in which a spot's cone is round; only directions count."""
+    matrix = np.asarray(light.world_from_light, np.float64)[:3, :3]
+    if abs(np.linalg.det(matrix)) < 1e-12 * np.abs(matrix).max() ** 3:
+        return light_axes(light).T
+    inverse = np.linalg.inv(matrix)
+    return inverse / np.abs(inverse).max()
 
 
 def _emitter_radius(light: Light, half: Sequence[float]) -> float:

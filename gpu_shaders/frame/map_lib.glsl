@@ -33,23 +33,33 @@ float map_plane_closeness(MapFace face, vec3 p, vec3 n, vec2 uv)
   return -(dot(n, p) - dot(n.xy, xy)) / (n.z * face.far);
 }
 
-/* Closeness of the linear depth z / far that the maps hold. */
-float map_closeness(MapFace face, float linear_depth)
+/* Depths of perspective maps, z / far, are kept by the bits of that float: nearly its logarithm, so near and far are held
+ * equally well, and the same on every GPU. MAP_NEAR_BITS and MAP_FAR_BITS are defines (frame/structs.py). */
+float map_depth(float part_of_far)
 {
-  return face.perspective != 0 ? 1.0 / max(linear_depth, 1e-9) : -linear_depth;
+  int bits = floatBitsToInt(part_of_far) - MAP_NEAR_BITS;
+  return clamp(float(bits) / float(MAP_FAR_BITS - MAP_NEAR_BITS), 0.0, 1.0);
 }
 
-/* Which of a light's faces looks at the direction `d` (in the light's frame, from the light). One or two faces: the
- * first (a sun's second holds what its first does not). Five are the half cube around -Z in the order -Z +X -X +Y -Y,
- * six the whole cube with +Z last. */
-int map_face_of(int face_count, vec3 d)
+/* Closeness of what a map holds as its depth. */
+float map_closeness(MapFace face, float depth)
 {
-  if (face_count <= 2) {
+  if (face.perspective == 0) {
+    return -depth;
+  }
+  return 1.0 / intBitsToFloat(MAP_NEAR_BITS + int(depth * float(MAP_FAR_BITS - MAP_NEAR_BITS) + 0.5));
+}
+
+/* Which of a light's faces looks toward the position p in the frame of its first. One is all there is; five are the half
+ * cube around it in the order -Z +X -X +Y -Y of the light's frame (maps.py), six the whole cube with +Z last. */
+int map_face_of(int face_count, vec3 p)
+{
+  if (face_count == 1) {
     return 0;
   }
-  vec3 a = abs(d);
+  vec3 a = abs(p);
   if (a.z >= max(a.x, a.y)) {
-    return d.z < 0.0 ? 0 : face_count - 1;
+    return p.z > 0.0 ? 0 : face_count - 1;
   }
-  return a.x >= a.y ? (d.x > 0.0 ? 1 : 2) : (d.y > 0.0 ? 3 : 4);
+  return a.x >= a.y ? (p.x > 0.0 ? 1 : 2) : (p.y > 0.0 ? 3 : 4);
 }

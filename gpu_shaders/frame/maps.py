@@ -2,7 +2,7 @@
 
 A spot has one perspective face, a point light the six faces of a cube, an area light (and a spot too wide for one
 face) the half cube before it. A sun has one orthographic face fitted to the scene; where a few huge objects (a ground
-plane) would take nearly all of its texels, it has one fitted to the rest and a second for everything.
+plane) would take nearly all of its texels, it has one fitted to the rest and ever wider ones up to everything.
 """
 
 from __future__ import annotations
@@ -18,17 +18,19 @@ from ...scene.data import Light, LightKind
 WIDEST_SINGLE_FACE = math.radians(130.0)
 # Room around a cone's edge: the receivers right on it, and those that a moved sample of the emitter sees.
 CONE_MARGIN = 1.02
-# Nearest distance that a perspective map holds, as a part of its farthest.
-NEAR_OF_FAR = 1e-4
-# float32 rounding of positions, of matrices and of a rasteriser's 1 / w over triangles that reach behind the light, in
-# parts of the largest coordinate involved. Measured on Mesa: 5e-6 where a lamp stands just above a floor.
-ROUNDING = 1e-5
-
-# A sun gets a second face when leaving out at most so many objects makes its picture so many times smaller.
+# Nearest distance that a perspective map holds, as a part of its farthest: a lamp's own shade, in a scene with a far
+# horizon. Depth is kept by its float bits, so near and far are held equally well (map_depth() in map_lib.glsl).
+NEAR_OF_FAR = 1e-6
+# The float bits of that part and of 1: the range of a perspective map's depth.
+NEAR_BITS, FAR_BITS = (int(np.float32(part).view(np.int32)) for part in (NEAR_OF_FAR, 1.0))
+# A sun gets several faces when leaving out at most so many objects makes its picture so many times smaller.
 MOST_HUGE_OBJECTS = 4
-WORTHWHILE_SHRINK = 16.0
-# The narrow face reaches this part of its width further: the ground around an object is what bounces most onto it.
+WORTHWHILE_SHRINK = 36.0
+# The narrowest face reaches this part of its width further: the ground around an object bounces most onto it.
 NEAR_MARGIN = 0.5
+# Each face is so many times as wide as the one inside it: a texel stays a few percent of its distance from what the
+# inner face holds, so the bounce that comes from there is not blurred.
+CASCADE_STEP = 6.0
 
 _CUBE = {  # forward, up: in the light's frame, in the order of map_face_of() in map_lib.glsl
     "-Z": ((0, 0, -1), (0, 1, 0)),
@@ -49,7 +51,6 @@ class Face:
     scale: tuple[float, float]
     near: float
     far: float
-    epsilon: float
     perspective: bool
 
     @property
@@ -64,6 +65,13 @@ class Face:
         else:
             clip[2, 2], clip[2, 3], clip[3, 3] = 2 / self.far, -1, 1
         return clip @ self.face_from_world
+
+    def metres(self, depth: np.ndarray) -> np.ndarray:
+        """Distance along the face's axis from what its map holds as depth, float32: map_depth() inverted."""
+        if not self.perspective:
+            return depth * np.float32(self.far)
+        bits = NEAR_BITS + np.rint(depth.astype(np.float64) * (FAR_BITS - NEAR_BITS)).astype(np.int32)
+        return bits.view(np.float32) * np.float32(self.far)
 
     @property
     def texel_measure(self) -> float:
@@ -83,15 +91,17 @@ class Face:
 
 
 def light_axes(light: Light) -> np.ndarray:
-    """(3, 3) unit columns at right angles: the light's own Z in the world, its X and Y as near as a shear lets them.
+    """(3, 3) unit columns: the light's own X, Y, Z in the world, at whatever angles a shear leaves them."""
+    axes = np.asarray(light.world_from_light, np.float64)[:3, :3]
+    return np.stack([_unit(axes[:, k], np.eye(3)[k]) for k in range(3)], axis=1)
 
-    A mirrored light keeps its mirrored frame.
-    """
-    x, y, z = np.asarray(light.world_from_light, np.float64)[:3, :3].T
-    z = _unit(z, np.array((0.0, 0.0, 1.0)))
-    x = _unit(x - z * (x @ z), _any_perpendicular(z))
-    y = _unit(y - z * (y @ z) - x * (y @ x), np.cross(z, x))
-    return np.stack([x, y, z], axis=1)
+
+def light_frame(light: Light) -> np.ndarray:
+    """(3, 3) rotation from the frame of the light's maps into the world: its Z, its Y as near as a shear lets it."""
+    axes = light_axes(light)
+    z = axes[:, 2]
+    y = _unit(axes[:, 1] - z * (axes[:, 1] @ z), _any_perpendicular(z))
+    return np.stack([np.cross(y, z), y, z], axis=1)
 
 
 def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
@@ -99,33 +109,38 @@ def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
     return v / length if length > 1e-12 else otherwise
 
 
-def spot_stretch(light: Light) -> tuple[float, float]:
-    """The object's scale along Z over that along X and Y: a spot's cone is round in object space only."""
-    x, y, z = np.linalg.norm(np.asarray(light.world_from_light, np.float64)[:3, :3], axis=0)
-    return (float(z / x), float(z / y)) if min(x, y, z) > 0 else (1.0, 1.0)
-
-
 def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
     """The faces of one light for a scene of instances within ``boxes`` (n, 2, 3), n > 0.
 
     ``source`` moves the light to a sample of its emitter: a point, for a sun the unit direction to it.
     """
-    axes = light_axes(light)
+    frame = light_frame(light)
     if light.kind is LightKind.SUN:
-        return _sun_faces(axes, boxes, axes[:, 2] if source is None else source)
+        return _sun_faces(frame, boxes, frame[:, 2] if source is None else source)
     bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
     origin = np.asarray(light.world_from_light[:3, 3] if source is None else source, np.float64)
     farthest = np.linalg.norm(np.maximum(abs(bounds[0] - origin), abs(bounds[1] - origin)))
     far = _rounded_up(max(float(farthest), 1e-6))
-    reach = float(np.abs(bounds).max(initial=0.0)) + float(np.abs(origin).max())
-    epsilon = ROUNDING * max(1.0, reach / far)
-    if light.kind is LightKind.SPOT and light.spot_angle <= WIDEST_SINGLE_FACE:
-        tangents = math.tan(0.5 * light.spot_angle) / np.array(spot_stretch(light))
-        if tangents.max() <= math.tan(0.5 * WIDEST_SINGLE_FACE):
-            scale = 1.0 / np.maximum(tangents * CONE_MARGIN, 1e-4)
-            return (_cube_face("-Z", "", axes, origin, scale, far, epsilon),)
+    if light.kind is LightKind.SPOT:
+        tangents = _cone_tangents(light, frame)
+        if tangents is not None and tangents.max() <= math.tan(0.5 * WIDEST_SINGLE_FACE):
+            return (_cube_face("-Z", "", frame, origin, 1.0 / np.maximum(tangents * CONE_MARGIN, 1e-4), far),)
     names = list(_CUBE) if light.kind is LightKind.POINT else list(_CUBE)[:5]
-    return tuple(_cube_face(name, name, axes, origin, (1.0, 1.0), far, epsilon) for name in names)
+    return tuple(_cube_face(name, name, frame, origin, (1.0, 1.0), far) for name in names)
+
+
+def _cone_tangents(light: Light, frame: np.ndarray) -> np.ndarray | None:
+    """(2,) how far a spot's cone, round in object space only, reaches along X and Y of its frame at distance 1.
+
+    None for a cone that reaches to the side or behind.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    half = 0.5 * light.spot_angle
+    edge = np.stack([math.sin(half) * np.cos(angles), math.sin(half) * np.sin(angles), np.full(64, -math.cos(half))])
+    d = frame.T @ np.asarray(light.world_from_light, np.float64)[:3, :3] @ edge
+    if (d[2] >= -1e-6 * np.abs(d).max()).any():
+        return None
+    return np.abs(d[:2] / d[2]).max(axis=1)
 
 
 def _rounded_up(length: float) -> float:
@@ -133,10 +148,10 @@ def _rounded_up(length: float) -> float:
     return 2.0 ** (math.ceil(4.0 * math.log2(length * 1.001)) / 4.0)
 
 
-def _cube_face(side, name, axes, origin, scale, far, epsilon) -> Face:
-    forward, up = (axes @ np.asarray(v, np.float64) for v in _CUBE[side])
+def _cube_face(side, name, frame, origin, scale, far) -> Face:
+    forward, up = (frame @ np.asarray(v, np.float64) for v in _CUBE[side])
     scale = (float(scale[0]), float(scale[1]))
-    return Face(name, _looking(origin, forward, up), scale, NEAR_OF_FAR * far, far, epsilon, True)
+    return Face(name, _looking(origin, forward, up), scale, NEAR_OF_FAR * far, far, True)
 
 
 def _looking(origin, forward, up) -> np.ndarray:
@@ -146,28 +161,37 @@ def _looking(origin, forward, up) -> np.ndarray:
     return matrix
 
 
-def _sun_faces(axes, boxes, to_sun) -> tuple[Face, ...]:
+def _sun_faces(frame, boxes, to_sun) -> tuple[Face, ...]:
     """Orthographic, as small as the scene seen along the light allows; the view has no part in it."""
-    rows = _sun_rows(axes, np.asarray(to_sun, np.float64))
+    rows = _sun_rows(frame, np.asarray(to_sun, np.float64))
     lower, upper = _seen_along(rows, boxes)
     everything = lower.min(0), upper.max(0)
-    reach = float(np.abs(boxes).max())
     # Asked of the sun's own direction, so that all samples of its disc have the same number of faces.
-    kept = _without_huge(*_seen_along(_sun_rows(axes, axes[:, 2]), boxes))
+    own_lower, own_upper = _seen_along(_sun_rows(frame, frame[:, 2]), boxes)
+    kept = _without_huge(own_lower, own_upper)
     if kept is None:
-        return (_sun_face(rows, *everything, reach, ""),)
-    # The narrow picture keeps the whole depth: what blocks the light may be huge.
+        return (_sun_face(rows, *everything, ""),)
+    wide = (own_upper.max(0) - own_lower.min(0))[:2] / (own_upper[kept].max(0) - own_lower[kept].min(0))[:2]
+    steps = max(math.ceil(math.log(wide.max() / (1.0 + 2.0 * NEAR_MARGIN), CASCADE_STEP)), 1)
     low, high = lower[kept].min(0), upper[kept].max(0)
-    margin = NEAR_MARGIN * (high - low)
-    low, high = np.maximum(low - margin, everything[0]), np.minimum(high + margin, everything[1])
+    extents = [_widened(low, high, CASCADE_STEP**k, everything) for k in range(steps)] + [everything]
+    return tuple(_sun_face(rows, *extent, f"Cascade {number}") for number, extent in enumerate(extents, 1))
+
+
+def _widened(low, high, times: float, everything) -> tuple[np.ndarray, np.ndarray]:
+    """The rectangle with its margin, ``times`` as wide, within everything; as deep as everything: whatever blocks the
+    light may be huge.
+    """
+    center, half = 0.5 * (low + high), (0.5 + NEAR_MARGIN) * times * (high - low)
+    low, high = np.maximum(center - half, everything[0]), np.minimum(center + half, everything[1])
     low[2], high[2] = everything[0][2], everything[1][2]
-    return _sun_face(rows, low, high, reach, "Near"), _sun_face(rows, *everything, reach, "Far")
+    return low, high
 
 
-def _sun_rows(axes, to_sun) -> np.ndarray:
+def _sun_rows(frame, to_sun) -> np.ndarray:
     """(3, 3) rotation into the frame of a sun's face: right, up, away from the sun."""
     forward = -to_sun
-    up = axes[:, 1] - forward * (axes[:, 1] @ forward)
+    up = frame[:, 1] - forward * (frame[:, 1] @ forward)
     up = _unit(up, _any_perpendicular(forward))
     return np.stack([np.cross(forward, up), up, forward])
 
@@ -195,15 +219,14 @@ def _area(lower: np.ndarray, upper: np.ndarray) -> float:
     return float(np.prod((upper.max(0) - lower.min(0))[:2]))
 
 
-def _sun_face(rows, lower, upper, reach: float, name: str) -> Face:
+def _sun_face(rows, lower, upper, name: str) -> Face:
     half = np.maximum(0.5 * (upper - lower), 1e-6) * 1.001
     center = 0.5 * (lower + upper)
     depth = 2.0 * half[2]
     matrix = np.eye(4)
     matrix[:3, :3] = rows
     matrix[:3, 3] = -center[0], -center[1], half[2] - center[2]
-    epsilon = ROUNDING * max(1.0, reach / depth)
-    return Face(name, matrix, (1.0 / half[0], 1.0 / half[1]), 0.0, depth, epsilon, False)
+    return Face(name, matrix, (1.0 / half[0], 1.0 / half[1]), 0.0, depth, False)
 
 
 def _any_perpendicular(v: np.ndarray) -> np.ndarray:
@@ -249,7 +272,6 @@ def face_row(face: Face, atlas: Atlas, index: int) -> dict:
         "origin": atlas.origin(index),
         "far": face.far,
         "near": face.near,
-        "epsilon": face.epsilon,
         "tile": atlas.tile,
         "perspective": int(face.perspective),
     }

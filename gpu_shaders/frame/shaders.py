@@ -1,7 +1,7 @@
 """Declarations of the passes that every frame has."""
 
 from ...device.shader import Shader
-from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_FACE, MATERIAL
+from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3", "in_base_uv": "VEC2", "in_emission_uv": "VEC2"}
 MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3", "v_base_uv": "VEC2", "v_emission_uv": "VEC2"}
@@ -39,7 +39,7 @@ SHADOW = Shader(
     varyings={"v_depth": "FLOAT"},
     outputs={"out_slope": "VEC4"},
     samplers={"instance_tx": "FLOAT_2D"},
-    structs=(INSTANCE,),
+    structs=(INSTANCE, MAP_FACE),
     constants={
         "pc_clip_from_world": "MAT4",
         "pc_first_instance": "INT",
@@ -47,6 +47,7 @@ SHADOW = Shader(
         "pc_far": "FLOAT",
         "pc_tile": "FLOAT",
     },
+    defines=MAP_DEFINES,
     depth_write=True,
 )
 
@@ -64,7 +65,7 @@ DIRECT = Shader(
     },
     structs=(LIGHT, MAP_FACE),
     constants={"pc_first_light": "INT", "pc_last_light": "INT", "pc_seed": "INT", "pc_sample": "INT"},
-    defines=LIGHT_DEFINES,
+    defines=(*LIGHT_DEFINES, *MAP_DEFINES),
 )
 
 ACCUMULATE = Shader(

@@ -1,12 +1,13 @@
-/* Depth kept linear (z / far), and the slope of closeness over the tile. With the slope a texel is a piece of plane
- * and not a step, so a surface does not shadow itself and no bias in metres is needed (frame/shadow_lib.glsl). */
+/* Depth, and the slope of closeness over the tile. With the slope a texel is a piece of plane and not a step, so a
+ * surface does not shadow itself and no bias in metres is needed (frame/shadow_lib.glsl). */
+#include "frame/map_lib.glsl"
 
 void main()
 {
   float closeness, depth;
   if (pc_perspective != 0) {
     closeness = pc_far * gl_FragCoord.w;
-    depth = 1.0 / closeness;
+    depth = map_depth(1.0 / closeness);
   } else {
     depth = 0.5 * v_depth + 0.5;
     closeness = -depth;

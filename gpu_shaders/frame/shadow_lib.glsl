@@ -11,11 +11,20 @@ const float SHADOW_BLOCKER_RATIO = 4.0;
 /* and never over more than this part of the tile, which bounds its cost and noise. */
 const float SHADOW_WIDEST_SEARCH = 0.15;
 
+/* What rounding leaves uncertain, each a few times what it can be: depth as a map holds it (relative in perspective, part
+ * of the whole depth in orthographic maps); directions, relative; world positions, relative to their coordinates;
+ * slopes, kept as halves. */
+const float SHADOW_DEPTH_ROUNDING = 4e-6;
+const float SHADOW_DIRECTION_ROUNDING = 5e-7;
+const float SHADOW_POSITION_ROUNDING = 4e-7;
+const float SHADOW_SLOPE_ROUNDING = 1e-3;
+
 struct Receiver {
   vec3 p; /* position and geometric normal in the face's frame */
   vec3 n;
   vec2 uv;
   float closeness;
+  float rounding; /* of its position, metres */
 };
 
 /* What a texel says of the receiver: it lies before it; it is (about) the receiver's own surface; or its centre misses
@@ -29,6 +38,20 @@ struct ShadowTap {
   float closeness;
 };
 
+/* Rounding of the receiver's own closeness. */
+float shadow_receiver_rounding(MapFace face, Receiver receiver)
+{
+  return receiver.rounding * (face.perspective != 0 ? receiver.closeness / receiver.p.z : 1.0 / face.far);
+}
+
+/* Rounding of the closeness of the receiver's plane, `plane`, away from the receiver. */
+float shadow_plane_rounding(MapFace face, Receiver receiver, float plane)
+{
+  float height = SHADOW_DIRECTION_ROUNDING * length(receiver.p) + receiver.rounding;
+  return height *
+         (face.perspective != 0 ? abs(plane / dot(receiver.n, receiver.p)) : 1.0 / (abs(receiver.n.z) * face.far));
+}
+
 ShadowTap shadow_tap(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, vec2 uv)
 {
   vec2 place = clamp(floor(uv * face.tile), vec2(0.0), vec2(face.tile - 1.0));
@@ -39,14 +62,17 @@ ShadowTap shadow_tap(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Recei
   }
   vec2 center = (place + 0.5) / face.tile;
   float closeness = map_closeness(face, depth);
-  float tolerance = face.perspective != 0 ? face.epsilon * closeness * closeness : face.epsilon;
+  float rounding = SHADOW_DEPTH_ROUNDING * (face.perspective != 0 ? closeness : 1.0);
   vec2 slope = texelFetch(slope_tx, texel, 0).rg;
-  bool before_receiver = closeness + dot(slope, receiver.uv - center) > receiver.closeness + tolerance;
+  float along = dot(slope, receiver.uv - center);
+  float at_receiver = rounding + SHADOW_SLOPE_ROUNDING * abs(along) + shadow_receiver_rounding(face, receiver);
+  bool before_receiver = closeness + along > receiver.closeness + at_receiver;
   float plane = map_plane_closeness(face, receiver.p, receiver.n, center);
-  if (closeness > plane + tolerance) {
+  float at_texel = rounding + shadow_plane_rounding(face, receiver, plane);
+  if (closeness > plane + at_texel) {
     return ShadowTap(before_receiver ? SHADOW_BLOCKED : SHADOW_MISSED, closeness);
   }
-  return ShadowTap(closeness < plane - 4.0 * tolerance ? SHADOW_MISSED : SHADOW_LIT, closeness);
+  return ShadowTap(closeness < plane - 4.0 * at_texel ? SHADOW_MISSED : SHADOW_LIT, closeness);
 }
 
 Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
@@ -56,19 +82,34 @@ Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
   receiver.n = mat3(face.face_from_world) * geometric;
   receiver.uv = map_uv(face, receiver.p);
   receiver.closeness = face.perspective != 0 ? face.far / receiver.p.z : -receiver.p.z / face.far;
+  vec3 size = abs(P);
+  receiver.rounding = SHADOW_POSITION_ROUNDING * max(size.x, max(size.y, size.z));
   return receiver;
 }
 
-/* Visibility from one map position: one texel's width of softness, from noise over the samples. Where a
- * texel tells nothing (a wall's top edge would be lit from beyond the ceiling that rests on it), the texel on the other
- * side answers for it. */
+/* Visibility by those of the nine texels around the receiver's own that tell something; lit if none does. */
+float shadow_around(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver)
+{
+  float lit = 0.0;
+  float telling = 0.0;
+  for (int i = 0; i < 9; i++) {
+    vec2 aside = vec2(i % 3 - 1, i / 3 - 1) / face.tile;
+    int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
+    telling += state == SHADOW_MISSED ? 0.0 : 1.0;
+    lit += state == SHADOW_LIT ? 1.0 : 0.0;
+  }
+  return telling > 0.0 ? lit / telling : 1.0;
+}
+
+/* Visibility from one map position: one texel's width of softness, from noise over the samples. Where a texel tells
+ * nothing (a wall's top edge would be lit from beyond the ceiling that rests on it), those around answer for it. */
 float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
   vec2 aside = (noise - 0.5) / face.tile;
   int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
   if (state == SHADOW_MISSED) {
-    state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv - aside).state;
+    return shadow_around(face, depth_tx, slope_tx, receiver);
   }
   return state == SHADOW_BLOCKED ? 0.0 : 1.0;
 }
@@ -94,7 +135,7 @@ float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
     }
   }
   if (blockers == 0.0) {
-    return 1.0;
+    return shadow_hard(face, depth_tx, slope_tx, P, geometric, noise);
   }
   blocker /= blockers;
   float width =
@@ -102,9 +143,12 @@ float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
       (face.perspective != 0 ? (blocker - receiver.closeness) / face.far : (blocker - receiver.closeness) * face.far);
   width = clamp(width, 0.5 / face.tile, SHADOW_WIDEST_SEARCH);
   float lit = 0.0;
+  float telling = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {
     vec2 uv = receiver.uv + width * sampling_vogel_disc(i, SHADOW_TAPS, noise.y);
-    lit += shadow_tap(face, depth_tx, slope_tx, receiver, uv).state == SHADOW_BLOCKED ? 0.0 : 1.0;
+    int state = shadow_tap(face, depth_tx, slope_tx, receiver, uv).state;
+    telling += state == SHADOW_MISSED ? 0.0 : 1.0;
+    lit += state == SHADOW_LIT ? 1.0 : 0.0;
   }
-  return lit / float(SHADOW_TAPS);
+  return telling > 0.0 ? lit / telling : shadow_around(face, depth_tx, slope_tx, receiver);
 }

@@ -2,11 +2,13 @@
 
 from ...device.structs import Struct
 from ...scene.data import LightKind
+from .maps import FAR_BITS, NEAR_BITS
 
 LIGHT_KINDS = {kind: number for number, kind in enumerate(LightKind)}
 IMAGE_CLOSEST, IMAGE_EXTEND = 1, 2  # bits of MATERIAL's modes
 
 LIGHT_DEFINES = tuple((f"LIGHT_{kind.name}", str(number)) for kind, number in LIGHT_KINDS.items())
+MAP_DEFINES = (("MAP_NEAR_BITS", str(NEAR_BITS)), ("MAP_FAR_BITS", str(FAR_BITS)))
 IMAGE_DEFINES = (("IMAGE_CLOSEST", str(IMAGE_CLOSEST)), ("IMAGE_EXTEND", str(IMAGE_EXTEND)))
 
 INSTANCE = Struct("Instance", world_from_object="mat4")
@@ -23,7 +25,7 @@ LIGHT = Struct(
     "Light",
     position="vec3",  # the emitter's centre
     kind="int",  # LIGHT_KINDS
-    axis_x="vec3",  # the light's own axes in the world, unit; it looks down -axis_z
+    axis_x="vec3",  # the light's own axes in the world, unit, it looks down -axis_z; spot: rows of object-from-world
     spot_cosine="float",  # cosine of half the cone; sun: of half its angle
     axis_y="vec3",
     spot_smooth="float",  # 1 / (blend (1 - spot_cosine))
@@ -33,14 +35,12 @@ LIGHT = Struct(
     face_count="int",  # shadow map faces, 0: casts no shadow
     source="vec3",  # this frame's point on the emitter; sun: unit direction to it
     first_face="int",
-    map_origin="vec3",  # where the shadow map was drawn from
     filtered="int",  # 1: PCSS from the centre, 0: the map was drawn from `source`
     half_size="vec2",  # area: half extents, metres
     spread_tangent="float",  # area: tangent of half the spread, -1: none
     spread_normalize="float",
     emitter_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
     round_shape="int",  # area: 1 for disk and ellipse
-    spot_stretch="vec2",  # the object's scale along Z over that along X and Y: it stretches a spot's cone
 )
 
 MAP_FACE = Struct(
@@ -50,7 +50,6 @@ MAP_FACE = Struct(
     origin="vec2",  # lower left texel of the tile in the atlas
     far="float",  # metres
     near="float",
-    epsilon="float",  # what float32 cannot tell apart, part of far
     tile="float",  # texels along a side
     perspective="int",
 )

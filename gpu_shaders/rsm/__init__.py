@@ -34,6 +34,7 @@ WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
 LONGEST_LOOP = 1 << 15
 # How far a sample is after maps and coarse grid, for the progress bar.
 MAPS_DONE, COARSE_DONE = 0.2, 0.6
+STRIDES = {"HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one coarse pixel to the next, by interpolation
 Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
@@ -108,12 +109,12 @@ SETTINGS = (
         "Gather at some pixels only and reuse the result where surfaces agree. Coarser is faster, at the cost of "
         "detail in the bounce on small and curved surfaces",
         "OFF",
-        viewport_default="4",
+        viewport_default="QUARTER",
         items=(
             Item("OFF", "Off", "Every pixel gathers for itself"),
-            Item("2", "1:2", "Every second pixel of every second row gathers"),
-            Item("4", "1:4", "Every fourth pixel of every fourth row gathers"),
-            Item("8", "1:8", "Every eighth pixel of every eighth row gathers"),
+            Item("HALF", "1:2", "Every second pixel of every second row gathers"),
+            Item("QUARTER", "1:4", "Every fourth pixel of every fourth row gathers"),
+            Item("EIGHTH", "1:8", "Every eighth pixel of every eighth row gathers"),
         ),
     ),
 )
@@ -145,7 +146,7 @@ class Rsm:
             for done in self._gather(inputs, settings, target, self._none, 1, (0, 0)):
                 yield MAPS_DONE + (1.0 - MAPS_DONE) * done
             return
-        stride = int(settings["interpolation"])
+        stride = STRIDES[str(settings["interpolation"])]
         offset = _grid_offset(inputs, stride)
         coarse, coarse_target = self._coarse_target(inputs, stride)
         self.device.clear(coarse_target)
@@ -214,21 +215,23 @@ class Rsm:
         published = settings["estimator"] == "DISC_PUBLISHED"
         lights = len(inputs.gpu_scene.scene.lights)
         gathers = max(int(settings["gathers"]) // lights, LEAST_GATHERS_A_LIGHT)
-        step = max(texels // gathers, 1)
+        shared = {
+            "light_tx": self.maps.light_table,
+            "rsm_face_tx": self.maps.face_table,
+            "pc_gathers": gathers,
+            "pc_radius": float(settings["radius"]),
+            "pc_tile": float(atlas.tile),
+            "pc_seed": inputs.noise_seed(1),
+            "pc_sample": inputs.sample,
+        }
+        # Whole lights while they fit, else a part of one light's gathers.
+        step, part = max(texels // gathers, 1), min(gathers, texels)
         for first in range(0, lights, step):
             last = min(first + step, lights)
-            values = {
-                "light_tx": self.maps.light_table,
-                "rsm_face_tx": self.maps.face_table,
-                "pc_first_light": first,
-                "pc_last_light": last,
-                "pc_gathers": gathers,
-                "pc_radius": float(settings["radius"]),
-                "pc_tile": float(atlas.tile),
-                "pc_seed": inputs.noise_seed(1),
-                "pc_sample": inputs.sample,
-            }
-            yield GATHER_PUBLISHED if published else GATHER_EXACT, values, last / lights
+            for begin in range(0, gathers, part):
+                span = {"pc_first_light": first, "pc_last_light": last}
+                span |= {"pc_first_gather": begin, "pc_last_gather": min(begin + part, gathers)}
+                yield GATHER_PUBLISHED if published else GATHER_EXACT, {**shared, **span}, last / lights
 
     def _interpolate(
         self, inputs: FrameInputs, coarse: Texture, target: Target, stride: int, offset: tuple[int, int]

@@ -56,7 +56,7 @@ class ReflectiveShadowMaps(LightMaps):
         for tile in self.tiles:
             x, y, width, height = self.viewport(tile)
             part = np.s_[y : y + height, x : x + width]
-            metres = np.where(depth[part] < 1.0, depth[part] * np.float32(tile.face.far), np.float32(0.0))
+            metres = np.where(depth[part] < 1.0, tile.face.metres(depth[part]), np.float32(0.0))
             layers = {"depth": metres, "position": position[part], "normal": normal[part], "flux": flux[part]}
             yield tile.light, tile.face.name, layers
 
@@ -106,5 +106,7 @@ class ReflectiveShadowMaps(LightMaps):
         )
 
     def _served_by(self, tile: MapTile) -> int:
-        """Index of the face whose part of the scene this tile leaves to it: a sun's far face has a near one. Or -1."""
-        return self.tiles.index(tile) - 1 if tile.face.name == "Far" else -1
+        """Index of the face whose part of the scene this tile leaves to it: that inside a sun's wider one. Or -1."""
+        index = self.tiles.index(tile)
+        inside = index and not tile.face.perspective and self.tiles[index - 1].owner == tile.owner
+        return index - 1 if inside else -1

@@ -30,10 +30,10 @@ void main()
     albedo = surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv)
                  .albedo;
   }
-  /* A sun's far map sends no light from where its near map does. */
+  /* A sun's wide map sends no light from where the one inside it does. */
   if (pc_served >= 0) {
-    MapFace near_face = map_face_fetch(face_tx, pc_served);
-    if (map_holds(near_face, map_position(near_face, v_position))) {
+    MapFace inner = map_face_fetch(face_tx, pc_served);
+    if (map_holds(inner, map_position(inner, v_position))) {
       albedo = vec3(0.0);
     }
   }
@@ -42,7 +42,7 @@ void main()
   flux *= distance_squared / (distance_squared + light.soft_radius_squared);
   float area = measure * distance_squared / max(dot(geometric, d), RSM_GRAZING);
 
-  gl_FragDepth = clamp(pc_perspective != 0 ? 1.0 / (pc_far * gl_FragCoord.w) : gl_FragCoord.z, 0.0, 1.0);
+  gl_FragDepth = pc_perspective != 0 ? map_depth(1.0 / (pc_far * gl_FragCoord.w)) : clamp(gl_FragCoord.z, 0.0, 1.0);
   out_position_area = vec4(v_position, area);
   out_normal = vec4(normal, 1.0);
   out_flux = vec4(flux, 1.0);

@@ -6,7 +6,7 @@
  * otherwise  the exact weight of that density, 2 pi r_max^2 xi1, with half of the samples spread over the
  *            whole map and both halves weighted by the balance heuristic (Veach & Guibas 1995), so that the radius
  *            changes the noise and not the level. */
-#include "frame/map_lib.glsl"
+#include "frame/light_map_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "rsm/rsm_lib.glsl"
 
@@ -44,7 +44,7 @@ vec2 gather_disc_uv(Gather g, vec2 xi)
 vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
 {
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < pc_gathers; i++) {
+  for (int i = pc_first_gather; i < pc_last_gather; i++) {
     vec2 xi = sampling_r2(pc_sample * pc_gathers + i, shift);
     sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
   }
@@ -57,7 +57,7 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
   vec3 sum = vec3(0.0);
   int in_disc = int(GATHER_DISC_SHARE * float(pc_gathers));
   float share = float(in_disc) / float(pc_gathers);
-  for (int i = 0; i < pc_gathers; i++) {
+  for (int i = pc_first_gather; i < pc_last_gather; i++) {
     bool disc = i < in_disc;
     int index = disc ? pc_sample * in_disc + i : pc_sample * (pc_gathers - in_disc) + i - in_disc;
     vec2 xi = sampling_r2(index, disc ? shift : fract(shift.yx + 0.5));
@@ -93,16 +93,9 @@ void main()
   vec3 sum = vec3(0.0);
   for (int i = pc_first_light; i < pc_last_light; i++) {
     Light light = light_fetch(light_tx, i);
-    vec3 d = g.P - light.position;
-    vec3 local = vec3(dot(d, light.axis_x), dot(d, light.axis_y), dot(d, light.axis_z));
-    g.face = light.first_face + map_face_of(light.face_count, local);
+    g.face = light_map_face(light, rsm_face_tx, g.P);
     MapFace face = map_face_fetch(rsm_face_tx, g.face);
     vec3 p = map_position(face, g.P);
-    if (light.face_count == 2 && !map_holds(face, p)) {
-      g.face++;
-      face = map_face_fetch(rsm_face_tx, g.face);
-      p = map_position(face, g.P);
-    }
     p.z = max(p.z, face.near);
     g.place = clamp(map_uv(face, p), vec2(0.0), vec2(1.0));
     sum += gather_light(g, light.first_face, light.face_count, sampling_hash(pixel, pc_seed + i));

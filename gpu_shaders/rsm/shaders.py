@@ -2,7 +2,7 @@
 
 from ...device.shader import Shader
 from ..frame.shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
-from ..frame.structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_FACE, MATERIAL
+from ..frame.structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 DRAW = Shader(
     name="rsm_draw",
@@ -24,7 +24,7 @@ DRAW = Shader(
         "pc_texel_measure": "FLOAT",  # see rsm_draw_frag.glsl
         "pc_served": "INT",
     },
-    defines=(*LIGHT_DEFINES, *IMAGE_DEFINES),
+    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES),
     depth_write=True,
 )
 
@@ -58,13 +58,15 @@ def _gather_disc(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
             **_GRID,
             "pc_first_light": "INT",
             "pc_last_light": "INT",
-            "pc_gathers": "INT",
+            "pc_gathers": "INT",  # of a light in this sample; this pass takes those from pc_first_gather on
+            "pc_first_gather": "INT",
+            "pc_last_gather": "INT",
             "pc_radius": "FLOAT",
             "pc_tile": "FLOAT",
             "pc_seed": "INT",
             "pc_sample": "INT",
         },
-        defines=defines,
+        defines=(*LIGHT_DEFINES, *MAP_DEFINES, *defines),
     )
 
 

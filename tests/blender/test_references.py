@@ -51,7 +51,7 @@ def test_cornell_spot_all_texels_differ_by_visibility_only(render_shared):
         samples=2,  # no noise to average: two only smooth the edges
         rsm_estimator="ALL_TEXELS",
         rsm_resolution=128,
-        rsm_interpolation="4",
+        rsm_interpolation="QUARTER",
     )
     level, error = show("cornell_spot, all texels", diffuse(truth, "Indirect"), diffuse(test, "Indirect"))
     assert 1.10 <= level <= 1.18

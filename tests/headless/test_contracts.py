@@ -167,7 +167,7 @@ def test_depth_position_and_normal_are_the_surfaces(studio):
     assert (found["depth"][~seen] == 1e10).all() and not found["normal"][~seen].any()
 
 
-@pytest.mark.parametrize("changed", [{}, {"soft_shadows": "FILTERED", "rsm_interpolation": "4"}], ids=str)
+@pytest.mark.parametrize("changed", [{}, {"soft_shadows": "FILTERED", "rsm_interpolation": "QUARTER"}], ids=str)
 def test_cancelled_sample_leaves_whole_samples_and_no_trace(headless_device, changed):
     view, settings = VIEWS["37 x 3"], Settings.defaults(**{**QUICK, **changed})
     whole = Studio(headless_device)

@@ -136,7 +136,7 @@ def test_edits_and_frames_leave_no_memory_behind(headless_device):
         for count in (1, 5, 2):
             lamps = [light("POINT", (k, turn * 0.1, 2), key=f"{turn} {k}") for k in range(count)]
             meshes = [FLOOR, sphere("ball", (0, 0, 0.1 * turn), rings=3)]
-            for interpolation in ("OFF", "4"):
+            for interpolation in ("OFF", "QUARTER"):
                 shown = scene(meshes, lamps, 0.1 + 0.1 * turn)
                 studio.render(shown, ortho(8 + count, 8, 4), 1, rsm_interpolation=interpolation)
             studio.render(textured(True, True)[0], VIEW, 1, method="NONE")

@@ -294,8 +294,8 @@ def test_chosen_face_of_a_cube_holds_the_point(call, name):
         keep &= local[:, 2] < 0
     found = call(
         MAP,
-        f"vec4(map_face_of({len(faces)}, d.xyz))",
-        {"d": local[keep]},
+        f"vec4(map_face_of({len(faces)}, map_position(map_face_fetch(map_face_tx, 0), p.xyz)))",
+        {"p": points[keep]},
         tables=[MAP_FACE],
         map_face_tx=[face_row(faces[0], Atlas(1, 64, 1), 0)],
     )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rebound.gpu_shaders.frame.maps import light_faces
+from rebound.gpu_shaders.rsm import STRIDES
 from rebound.scene.data import Visibility
 from rebound.settings import Settings
 from rebound.tests.support.light_reference import irradiance
@@ -243,9 +244,9 @@ EXACT = {
     "image 64": dict(size=64),
     "image 256": dict(size=256, samples=2),
     "all texels, map 64": dict(estimator="ALL_TEXELS", resolution=64),
-    "interpolation 2": dict(interpolation="2"),
-    "interpolation 4": dict(interpolation="4", size=64),
-    "interpolation 8": dict(interpolation="8", size=64),
+    "interpolation 2": dict(interpolation="HALF"),
+    "interpolation 4": dict(interpolation="QUARTER", size=64),
+    "interpolation 8": dict(interpolation="EIGHTH", size=64),
 }
 
 
@@ -271,14 +272,15 @@ def test_published_estimator_keeps_its_level(studio, changed):
     assert level(**changed) == pytest.approx(level(), rel=0.02)  # noise of both means: 0.5 %
 
 
-@pytest.mark.parametrize("stride", ["2", "4", "8"])
+@pytest.mark.parametrize("stride", ["HALF", "QUARTER", "EIGHTH"])
 def test_interpolation_follows_the_full_gather(studio, stride):
     full, points = bounce(studio, CORNER, corner_view(48), resolution=32)
     found, _ = bounce(studio, CORNER, corner_view(48), resolution=32, interpolation=stride)
     from_crease = np.maximum(1 - points[..., 1], points[..., 2]) / (1.8 / 48 * math.sqrt(2))
-    smooth = from_crease > 1.5 * int(stride)
+    smooth = from_crease > 1.5 * STRIDES[stride]
     # No noise: what differs is the curvature of the irradiance between coarse pixels, strong beside the crease.
-    assert np.sqrt(np.mean((found - full)[smooth] ** 2)) < {"2": 0.01, "4": 0.02, "8": 0.05}[stride] * full.mean()
+    bound = {"HALF": 0.01, "QUARTER": 0.02, "EIGHTH": 0.05}[stride] * full.mean()
+    assert np.sqrt(np.mean((found - full)[smooth] ** 2)) < bound
     assert np.abs(found - full).max() < 0.8 * full.max()
     assert found.mean() == pytest.approx(full.mean(), rel=0.08)  # one place of the coarse grid
 

@@ -8,7 +8,7 @@ import pytest
 
 from rebound.gpu_shaders.frame.light_maps import LightMaps, MapTile
 from rebound.gpu_shaders.frame.lights import emitter_sample
-from rebound.gpu_shaders.frame.maps import Atlas, light_axes, light_faces
+from rebound.gpu_shaders.frame.maps import CASCADE_STEP, Atlas, light_faces, light_frame
 from rebound.tests.support.render_scenes import light
 
 RNG = np.random.default_rng(2)
@@ -100,11 +100,13 @@ def test_sun_is_fitted_tightly_to_the_scene():
 def test_sun_over_a_huge_ground_gets_a_near_map_for_the_rest():
     sun = light("SUN", (1, 2, 3), (0, 0, 0))
     ground = np.array([[-100.0, -100, 0], [100, 100, 0]])
-    near, far = light_faces(sun, np.stack([ground, *BOXES]))
+    near, *_, far = faces = light_faces(sun, np.stack([ground, *BOXES]))
     corners = np.array(np.meshgrid(*BOXES[0].T)).reshape(3, -1).T
     assert holds(near, corners).all()
     assert holds(far, np.array([ground[0], ground[1]])).all()
-    assert near.texel_measure < far.texel_measure / 16
+    widths = np.array([2 / np.array(face.scale) for face in faces])
+    assert near.texel_measure < far.texel_measure / 36
+    assert (widths[1:] <= widths[:-1] * (CASCADE_STEP + 0.01)).all(), "no face is so wide that what it adds is coarse"
     # A blocker of any height over the near part is in its depth: the tower that is as tall as the scene.
     assert (near.far, near.face_from_world[2].tolist()) == (far.far, far.face_from_world[2].tolist())
 
@@ -282,13 +284,23 @@ def test_cancelled_drawing_leaves_the_rest_stale():
     assert draw(maps, FakeScene(2, [(2, under_a)])) == "a"
 
 
-def test_sheared_light_has_axes_at_right_angles_and_keeps_its_direction():
+def test_maps_of_a_sheared_light_have_a_frame_at_right_angles():
     sheared = np.eye(4)
     sheared[:3, :3] = [[1.0, 0.5, 0.3], [0.0, 2.0, 0.2], [0.0, 0.0, -0.7]]
-    axes = light_axes(dataclasses.replace(light("AREA", (0, 0, 0), (0, 0, -1)), world_from_light=sheared))
-    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(axes[:, 2], sheared[:3, 2] / np.linalg.norm(sheared[:3, 2]), atol=1e-12)
-    assert np.linalg.det(axes) < 0, "mirrored stays mirrored"
+    frame = light_frame(dataclasses.replace(light("AREA", (0, 0, 0), (0, 0, -1)), world_from_light=sheared))
+    np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(frame[:, 2], sheared[:3, 2] / np.linalg.norm(sheared[:3, 2]), atol=1e-12)
+    assert np.linalg.det(frame) > 0, "maps are not mirrored, whatever the light is"
+
+
+def test_face_of_a_sheared_spot_holds_its_whole_cone():
+    sheared = np.eye(4)
+    sheared[:3, :3] = [[1.0, 0.5, 0.3], [0.0, 2.0, 0.2], [0.0, 0.0, 0.7]]
+    spot = dataclasses.replace(light("SPOT", (0, 0, 0), (0, 0, -1), spot_angle=50 * DEGREES), world_from_light=sheared)
+    (face,) = light_faces(spot, BOXES)
+    around = np.linspace(0, 2 * math.pi, 32)
+    edge = np.stack([np.cos(around), np.sin(around), np.full(32, -1 / math.tan(25 * DEGREES))], 1)
+    assert holds(face, 0.3 * edge @ sheared[:3, :3].T).all()
 
 
 def test_samples_of_a_sun_agree_on_the_number_of_faces():
