@@ -13,7 +13,7 @@ from .draws import ADD, draw_scene, visible_draws
 from .inputs import FrameInputs
 from .light_maps import LightMaps, MapTile
 from .lights import emitter_sample, has_size, light_row
-from .maps import Face, light_faces
+from .maps import FILTER_OVERLAP, Face, light_faces
 from .shaders import DIRECT, SHADOW
 from .structs import LIGHT
 from .tables import replace_table
@@ -90,7 +90,8 @@ class DirectLight:
         if source is not None:
             return light_faces(light, boxes, source)
         if light.key not in self._faces_of_still_lights:
-            self._faces_of_still_lights[light.key] = light_faces(light, boxes)
+            overlap = FILTER_OVERLAP if has_size(light) else 1.0
+            self._faces_of_still_lights[light.key] = light_faces(light, boxes, overlap=overlap)
         return self._faces_of_still_lights[light.key]
 
     def _draw_shadows(self, gpu_scene: GpuScene) -> Iterator[float]:

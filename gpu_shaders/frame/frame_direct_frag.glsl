@@ -27,7 +27,8 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   if (light.face_count == 0) {
     return 1.0;
   }
-  MapFace face = map_face_fetch(face_tx, light_map_face(light, face_tx, P));
+  int index = light_map_face(light, face_tx, P);
+  MapFace face = map_face_fetch(face_tx, index);
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
   bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;
   vec3 p = map_position(face, P);
@@ -35,7 +36,10 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
     return 1.0;
   }
   if (light.filtered != 0 && light.emitter_radius > 0.0) {
-    return shadow_soft(face, shadow_depth_tx, shadow_slope_tx, P, geometric, light.emitter_radius, noise);
+    /* The face before an area light has its axes; seen from its side, a round emitter has to do. */
+    bool before = light.kind == LIGHT_AREA && index == light.first_face;
+    vec2 radius = before ? light.half_size : vec2(light.emitter_radius);
+    return shadow_soft(face, shadow_depth_tx, shadow_slope_tx, P, geometric, radius, noise);
   }
   return shadow_hard(face, shadow_depth_tx, shadow_slope_tx, P, geometric, noise);
 }

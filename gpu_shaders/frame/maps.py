@@ -23,6 +23,9 @@ CONE_MARGIN = 1.02
 NEAR_OF_FAR = 1e-6
 # The float bits of that part and of 1: the range of a perspective map's depth.
 NEAR_BITS, FAR_BITS = (int(np.float32(part).view(np.int32)) for part in (NEAR_OF_FAR, 1.0))
+# How much wider a cube's faces are where shadows are filtered: room for a filter as wide as SHADOW_WIDEST_SEARCH of
+# shadow_lib.glsl on each side.
+FILTER_OVERLAP = 1.43
 # A sun gets several faces when leaving out at most so many objects makes its picture so many times smaller.
 MOST_HUGE_OBJECTS = 4
 WORTHWHILE_SHRINK = 36.0
@@ -109,10 +112,13 @@ def _unit(v: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
     return v / length if length > 1e-12 else otherwise
 
 
-def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = None) -> tuple[Face, ...]:
+def light_faces(
+    light: Light, boxes: np.ndarray, source: np.ndarray | None = None, *, overlap: float = 1.0
+) -> tuple[Face, ...]:
     """The faces of one light for a scene of instances within ``boxes`` (n, 2, 3), n > 0.
 
-    ``source`` moves the light to a sample of its emitter: a point, for a sun the unit direction to it.
+    ``source`` moves the light to a sample of its emitter: a point, for a sun the unit direction to it. ``overlap``
+    above 1 makes the faces of a cube so many times as wide, so that a filter near their edge finds what is beyond it.
     """
     frame = light_frame(light)
     if light.kind is LightKind.SUN:
@@ -126,7 +132,7 @@ def light_faces(light: Light, boxes: np.ndarray, source: np.ndarray | None = Non
         if tangents is not None and tangents.max() <= math.tan(0.5 * WIDEST_SINGLE_FACE):
             return (_cube_face("-Z", "", frame, origin, 1.0 / np.maximum(tangents * CONE_MARGIN, 1e-4), far),)
     names = list(_CUBE) if light.kind is LightKind.POINT else list(_CUBE)[:5]
-    return tuple(_cube_face(name, name, frame, origin, (1.0, 1.0), far) for name in names)
+    return tuple(_cube_face(name, name, frame, origin, (1.0 / overlap, 1.0 / overlap), far) for name in names)
 
 
 def _cone_tangents(light: Light, frame: np.ndarray) -> np.ndarray | None:

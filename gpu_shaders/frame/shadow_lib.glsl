@@ -115,15 +115,14 @@ float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
 }
 
 /* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter
- * over it. `radius` is the emitter's radius in metres, for a sun the tangent of half its angle. */
-float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, float radius,
-                  vec2 noise)
+ * over it. `radius` is the emitter's along the face's axes, metres; for a sun the tangent of half its angle. */
+float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 radius, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
-  float per_metre = 0.5 * max(face.scale.x, face.scale.y);
+  vec2 per_metre = 0.5 * face.scale * radius;
   float z = receiver.p.z;
-  float search = per_metre * radius * (face.perspective != 0 ? (SHADOW_BLOCKER_RATIO - 1.0) / z : z);
-  search = min(search, SHADOW_WIDEST_SEARCH);
+  vec2 search = per_metre * (face.perspective != 0 ? (SHADOW_BLOCKER_RATIO - 1.0) / z : z);
+  search = min(search, vec2(SHADOW_WIDEST_SEARCH));
   float blocker = 0.0;
   float blockers = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {
@@ -137,11 +136,9 @@ float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
   if (blockers == 0.0) {
     return shadow_hard(face, depth_tx, slope_tx, P, geometric, noise);
   }
-  blocker /= blockers;
-  float width =
-      per_metre * radius *
-      (face.perspective != 0 ? (blocker - receiver.closeness) / face.far : (blocker - receiver.closeness) * face.far);
-  width = clamp(width, 0.5 / face.tile, SHADOW_WIDEST_SEARCH);
+  float apart = blocker / blockers - receiver.closeness;
+  vec2 width = per_metre * (face.perspective != 0 ? apart / face.far : apart * face.far);
+  width = clamp(width, vec2(0.5 / face.tile), vec2(SHADOW_WIDEST_SEARCH));
   float lit = 0.0;
   float telling = 0.0;
   for (int i = 0; i < SHADOW_TAPS; i++) {

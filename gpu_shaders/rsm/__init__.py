@@ -56,7 +56,7 @@ SETTINGS = (
             Item(
                 "DISC_PUBLISHED",
                 "Disc, as Published",
-                "The disc of the 2005 paper with its weights: fast and smooth, but it "
+                "The disc of the 2005 paper with its weights: for comparison; it "
                 "loses near light and all light from beyond the disc",
             ),
             Item(
