@@ -7,10 +7,12 @@ from collections.abc import Callable, Hashable
 
 import numpy as np
 
+from .cameras import FARTHEST
 from .data import AreaShape, Array, Light, LightKind
 from .nodes import RGB, active_output, find_input, node_tree, source, strength_and_color
 
 MIN_SPREAD = math.radians(1.0)  # Blender allows 0, a laser that no grid of samples would ever hit
+MAX_POWER = float(np.finfo(np.float32).max)
 ROUND_SHAPES = {AreaShape.DISK, AreaShape.ELLIPSE}
 
 
@@ -24,6 +26,10 @@ def read_light(obj, matrix: Array, key: Hashable, lights_diffuse: bool, warn: Ca
     light = obj.data
     kind = LightKind(light.type)
     if _is_portal(light) or (kind is not LightKind.POINT and not np.linalg.norm(matrix[:3, :3], axis=0).all()):
+        return None
+    broken = _broken_parameter(light, kind)
+    if broken:
+        warn(f"Light '{light.name}': its {broken} is not finite or too large; it is left out")
         return None
     shape = _shape(light, kind)
     power = light_power(light, kind, matrix, warn)
@@ -46,7 +52,7 @@ def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], Non
     color = np.array(light.color, np.float64)
     if light.use_temperature:
         color *= np.array(light.temperature_color, np.float64)
-    power = color * light.energy * 2.0**light.exposure
+    power = color * light.energy * np.exp2(light.exposure)
     if not light.normalize:
         power *= normalization(light, kind, matrix)
     tree = node_tree(light)
@@ -55,6 +61,7 @@ def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], Non
     if not np.isfinite(power).all() or (power < 0.0).any():
         warn(f"Light '{light.name}': its power is negative or not a number; it is left out")
         return (0.0, 0.0, 0.0)
+    power = np.minimum(power, MAX_POWER)
     return float(power[0]), float(power[1]), float(power[2])
 
 
@@ -89,6 +96,24 @@ def normalization(light, kind: LightKind, matrix: Array) -> float:
 def _area_size(light) -> tuple[float, float]:
     square = AreaShape(light.shape) in {AreaShape.SQUARE, AreaShape.DISK}
     return float(light.size), float(light.size if square else light.size_y)
+
+
+def _broken_parameter(light, kind: LightKind) -> str | None:
+    """What Blender calls the first setting that nothing can be computed with; a power may be as large as it likes."""
+    if not math.isfinite(light.energy):
+        return "power"
+    values = {"exposure": light.exposure, "diffuse factor": light.diffuse_factor}
+    if kind is LightKind.SUN:
+        values["angle"] = light.angle
+    elif kind is LightKind.AREA:
+        width, height = _area_size(light)
+        values |= {"size": width, "size Y": height, "spread": light.spread}
+    else:
+        values["radius"] = light.shadow_soft_size
+    if kind is LightKind.SPOT:
+        values |= {"spot size": light.spot_size, "spot blend": light.spot_blend}
+    # Blender clamps infinity to the largest float; the first comparison is false for NaN.
+    return next((name for name, value in values.items() if not abs(value) < FARTHEST), None)
 
 
 def _shape(light, kind: LightKind) -> dict:

@@ -112,9 +112,16 @@ def test_zero_scale_is_harmless(rebound_scene, tmp_path, name):
     assert np.isfinite(picture(render(rebound_scene, tmp_path / "a.exr"))).all()
 
 
-@pytest.mark.parametrize("energy", [0.0, -5.0, 1e30, NAN, INF])
+@pytest.mark.parametrize("energy", [0.0, -5.0, 1e30, 3e38, NAN, INF])
 def test_odd_light_power_is_harmless(rebound_scene, tmp_path, energy):
     bpy.data.lights["Spot"].energy = energy
+    assert not np.isnan(picture(render(rebound_scene, tmp_path / "a.exr"))).any()
+
+
+@pytest.mark.parametrize("value", [NAN, INF])
+@pytest.mark.parametrize("name", ["shadow_soft_size", "spot_size", "spot_blend", "diffuse_factor", "exposure"])
+def test_odd_light_settings_are_harmless(rebound_scene, tmp_path, name, value):
+    setattr(bpy.data.lights["Spot"], name, value)
     assert not np.isnan(picture(render(rebound_scene, tmp_path / "a.exr"))).any()
 
 

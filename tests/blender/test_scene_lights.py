@@ -108,6 +108,50 @@ def test_negative_light_is_dropped_and_named():
     assert scene.lights == () and "'Lamp'" in scene.warnings[0]
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize(
+    ("kind", "name", "called"),
+    [
+        ("POINT", "shadow_soft_size", "radius"),
+        ("POINT", "diffuse_factor", "diffuse factor"),
+        ("POINT", "energy", "power"),
+        ("POINT", "exposure", "exposure"),
+        ("SPOT", "shadow_soft_size", "radius"),
+        ("SPOT", "spot_size", "spot size"),
+        ("SPOT", "spot_blend", "spot blend"),
+        ("SUN", "angle", "angle"),
+        ("AREA", "size", "size"),
+        ("AREA", "size_y", "size Y"),
+        ("AREA", "spread", "spread"),
+    ],
+)
+@pytest.mark.parametrize("normalize", [True, False])
+def test_light_with_a_parameter_that_is_not_finite_is_dropped_and_named(kind, name, called, value, normalize):
+    data = lamp(kind, normalize=normalize).data
+    if kind == "AREA":
+        data.shape = "RECTANGLE"
+    setattr(data, name, value)
+    scene = convert()
+    if 0 < getattr(data, name) < 1e18:  # Blender has put it into its own limits
+        assert len(scene.lights) == 1 and scene.warnings == ()
+    else:
+        assert scene.lights == () and len(scene.warnings) == 1
+        assert f"'Lamp': its {called} is not finite" in scene.warnings[0]
+
+
+@pytest.mark.filterwarnings("error")
+def test_power_stays_in_single_precision():
+    lamp("POINT", energy=3e38, exposure=10.0)
+    light, warnings = only_light()
+    assert light.power == (np.finfo(np.float32).max,) * 3 and warnings == ()
+    assert np.isfinite(np.array(light.power, np.float32)).all()
+
+
+def test_temperature_that_is_not_a_number_gives_no_such_power():
+    lamp("POINT", use_temperature=True, temperature=math.nan)
+    assert all(np.isfinite(light.power).all() for light in convert().lights)
+
+
 def test_ray_visibility_switches_diffuse_light():
     lamp("POINT").visible_diffuse = False
     assert only_light()[0].diffuse_factor == 0
