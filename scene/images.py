@@ -198,17 +198,31 @@ def _averaged(raw: Array, step: int, linear: Callable[[Array], Array]) -> Array:
 
 
 def _straightener(image) -> Callable[[Array], Array]:
-    """The function to straight alpha: byte images have it; float files keep their colours multiplied by alpha."""
+    """The function to straight alpha: byte images have it; float files keep their colours multiplied by alpha.
+
+    As in Cycles, which keeps all but data and packed channels multiplied, no colour is left where alpha is 0.
+    """
     if image.alpha_mode == "NONE":
         return _opaque
     if image.is_float and image.alpha_mode == "PREMUL":
         return _divided_by_alpha
+    if image.alpha_mode == "STRAIGHT" and not image.colorspace_settings.is_data:
+        return _black_where_clear
     return lambda pixels: pixels
 
 
 def _opaque(pixels: Array) -> Array:
     out = pixels.copy()
     out[..., 3] = 1.0
+    return out
+
+
+def _black_where_clear(pixels: Array) -> Array:
+    clear = pixels[..., 3] == 0.0
+    if not clear.any():
+        return pixels
+    out = pixels.copy()
+    out[clear, :3] = 0.0
     return out
 
 

@@ -74,6 +74,25 @@ def test_float_image_is_taken_as_it_is():
     np.testing.assert_allclose(pixels_of(convert()), RAMP * (4, 4, 4, 1), atol=1e-6)
 
 
+@pytest.mark.parametrize("float_buffer", [False, True])
+@pytest.mark.parametrize(
+    ("mode", "space", "is_black"),
+    [
+        ("STRAIGHT", "sRGB", True),
+        ("STRAIGHT", "Non-Color", False),
+        ("CHANNEL_PACKED", "sRGB", False),
+        ("NONE", "sRGB", False),
+    ],
+)
+def test_color_where_alpha_is_zero_is_black_as_in_cycles(float_buffer, mode, space, is_black):
+    pixels = [[[1, 1, 1, 0], [1, 1, 1, 0.5]]]
+    image = painted(pixels=pixels, size=(2, 1), float_buffer=float_buffer, space=space)
+    image.alpha_mode = mode
+    image.pixels.foreach_set(np.array(pixels, np.float32).ravel())
+    textured(image)
+    np.testing.assert_allclose(pixels_of(convert())[0, :, 0], (0 if is_black else 1, 1), atol=1e-5)
+
+
 def test_linear_spaces_are_converted_and_others_named():
     image = painted(pixels=RAMP, space="Linear Rec.709")
     textured(image)
