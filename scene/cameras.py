@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -32,14 +33,15 @@ def active_camera(depsgraph, engine=None):
     return camera.evaluated_get(depsgraph)
 
 
-def camera_warning(camera) -> str | None:
-    """One line if this camera can only be approximated."""
+def camera_warnings(camera) -> Iterator[str]:
+    """One line for each way in which this camera can only be approximated."""
     kind = camera.data.type
     if kind in {"PANO", "CUSTOM"}:
-        return (
+        yield (
             f"Camera '{camera.name}': type {kind} is not supported; a perspective camera of its focal length stands in"
         )
-    return None
+    if camera.data.dof.use_dof:
+        yield f"Camera '{camera.name}': depth of field is not shown yet; everything is sharp"
 
 
 def border_pixels(render, width: int, height: int) -> Border | None:

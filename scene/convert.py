@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 
 import numpy as np
 
-from .cameras import FARTHEST, camera_warning
+from .cameras import FARTHEST, camera_warnings
 from .data import Array, Instance, Light, Mesh, Scene, Visibility
 from .images import ImageReader, OnMainThread
 from .lights import read_light
@@ -99,6 +99,8 @@ class _SceneReader:
         mesh = self._mesh(obj)
         if mesh.triangle_count == 0:
             return
+        if obj.is_shadow_catcher or parent.is_shadow_catcher:
+            self.warn(f"Object '{obj.name}': shadow catchers are not supported yet; it is shown as any other object")
         slots = self._materials(obj, mesh)
         self.instances.append(Instance(key, mesh.key, slots, matrix, visibility))
 
@@ -156,14 +158,22 @@ class _SceneReader:
         self.keys.add(key)
         return key
 
+    def _warn_of_unread_settings(self, scene) -> None:
+        """Lines for what a final render would show and this one does not."""
+        if scene.camera is not None and scene.camera.type == "CAMERA":
+            for line in camera_warnings(scene.camera):
+                self.warn(line)
+        if scene.render.use_motion_blur:
+            self.warn("Motion blur is not shown yet; everything stands still")
+
     def scene(self) -> Scene:
         """The finished scene."""
         scene = self.depsgraph.scene_eval
-        if scene.camera is not None and scene.camera.type == "CAMERA":
-            line = camera_warning(scene.camera)
-            if line and not self.for_viewport:
-                self.warn(line)
+        if not self.for_viewport:
+            self._warn_of_unread_settings(scene)
         world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.warn)
+        if any(world.color):
+            self.warn("The world is shown and gives no light yet")
         return Scene(
             meshes={key: mesh for key, mesh in self.read.items() if mesh.triangle_count},
             instances=tuple(self.instances),

@@ -91,7 +91,7 @@ class MaterialTable:
             shown = ", ".join(f"'{name}'" for name in list(names)[:3])
             more = ", …" if len(names) > 3 else ""
             noun = "material" if len(names) == 1 else "materials"
-            self.warn(f"{len(names)} {noun} ({shown}{more}): {how} for now")
+            self.warn(f"{len(names)} {noun} ({shown}{more}): {how}")
         return tuple(self.materials)
 
 
@@ -112,6 +112,8 @@ class _Reader:
         if surface is None or not surface.socket.is_linked:
             return Material(self.name, base_color=BLACK)  # as in Cycles: nothing is reflected
         read = self.surface(surface)
+        if _is_driven(find_input(output, "Displacement")):
+            self.table.approximated("displacement is not read yet", self.name)
         if self.problems:
             self.table.warn(f"Material '{self.name}': {'; '.join(dict.fromkeys(self.problems))}")
         return Material(
@@ -132,6 +134,8 @@ class _Reader:
         if not found.socket.is_output:
             return Surface()
         kind = found.node.bl_idname
+        if _is_driven(found.input("Normal")):
+            self.table.approximated("bump and normal maps are not read yet", self.name)
         if depth > 32:
             self.problem("its shader tree is too deep")
             return Surface(Paint(GREY))
@@ -150,13 +154,15 @@ class _Reader:
 
     def principled(self, found: Socket) -> Surface:
         for name, plain, how in (
-            ("Metallic", 0.0, "metallic is shown as diffuse"),
-            ("Transmission Weight", 0.0, "transmission is shown as diffuse"),
-            ("Alpha", 1.0, "transparency is shown as opaque"),
+            ("Metallic", 0.0, "metallic is shown as diffuse for now"),
+            ("Transmission Weight", 0.0, "transmission is shown as diffuse for now"),
+            ("Alpha", 1.0, "transparency is shown as opaque for now"),
         ):
             socket = found.input(name)
-            value = socket and constant(socket)
-            if value and abs(mean(value) - plain) > 1e-6:
+            if socket is None:
+                continue
+            value = constant(socket)
+            if value is None or abs(mean(value) - plain) > 1e-6:  # None: a node makes it
                 self.table.approximated(how, self.name)
         emission = self.emission(found, "Emission Color", "Emission Strength")
         return Surface(self.paint(found.input("Base Color")), emission)
@@ -267,6 +273,12 @@ class _Reader:
             return self.uv_map(found.input("Vector"))
         self.problem(f"node '{found.node.name}' is not read yet, the image is laid by the active UV map")
         return ""
+
+
+def _is_driven(socket: Socket | None) -> bool:
+    """Whether a node that is not muted makes the value of an input."""
+    found = socket and source(socket)
+    return bool(found and found.socket.is_output and not found.node.mute)
 
 
 def read_world(world, warn: Callable[[str], None]) -> World:

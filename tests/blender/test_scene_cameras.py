@@ -247,6 +247,15 @@ def test_panoramic_camera_is_shown_in_perspective_with_a_warning():
     assert not convert_scene(depsgraph, for_viewport=True).warnings
 
 
+def test_depth_of_field_and_motion_blur_are_named_in_a_final_render():
+    camera().data.dof.use_dof = True
+    bpy.context.scene.render.use_motion_blur = True
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    lines = convert_scene(depsgraph, for_viewport=False).warnings
+    assert len(lines) == 2 and "'Camera': depth of field" in lines[0] and "Motion blur" in lines[1]
+    assert not convert_scene(depsgraph, for_viewport=True).warnings
+
+
 def test_region_view_takes_the_viewports_matrices():
     class Region:
         width, height = 0, 30

@@ -197,6 +197,12 @@ def test_bounds_display_is_shown():
     assert single(display_type="BOUNDS") == EVERYTHING
 
 
+def test_shadow_catcher_is_shown_and_named():
+    single(is_shadow_catcher=True)
+    (line,) = convert().warnings
+    assert "shadow catcher" in line and line.startswith("Object '")
+
+
 def test_holdout_object():
     assert single(is_holdout=True) == EVERYTHING | Visibility.HOLDOUT
 

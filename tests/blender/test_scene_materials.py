@@ -176,6 +176,40 @@ def test_metallic_materials_are_counted_in_one_line():
     assert len(warnings) == 1 and "5 materials" in warnings[0] and "'Metal 0'" in warnings[0]
 
 
+@pytest.mark.parametrize(
+    ("socket", "line"),
+    [
+        ("Metallic", "metallic is shown as diffuse for now"),
+        ("Transmission Weight", "transmission is shown as diffuse for now"),
+        ("Alpha", "transparency is shown as opaque for now"),
+        ("Normal", "bump and normal maps are not read yet"),
+    ],
+)
+def test_linked_inputs_that_are_not_read_are_counted_in_one_line(socket, line):
+    for number in range(2):
+        made = material(f"Linked {number}")
+        tree = made.node_tree
+        node = tree.nodes.new("ShaderNodeBump" if socket == "Normal" else "ShaderNodeTexChecker")
+        tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs[socket])
+        _, warnings = read(made)
+    assert warnings == (f"2 materials ('Linked 0', 'Linked 1'): {line}",)
+    node.mute = True
+    assert len(convert().warnings) == 1
+
+
+def test_displacement_and_the_normals_of_other_shaders_are_named():
+    made, shader = shader_material("Rough", "ShaderNodeBsdfDiffuse")
+    tree = made.node_tree
+    displacement, bump = tree.nodes.new("ShaderNodeDisplacement"), tree.nodes.new("ShaderNodeNormalMap")
+    output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(displacement.outputs[0], output.inputs["Displacement"])
+    tree.links.new(bump.outputs[0], shader.inputs["Normal"])
+    assert set(read(made)[1]) == {
+        "1 material ('Rough'): displacement is not read yet",
+        "1 material ('Rough'): bump and normal maps are not read yet",
+    }
+
+
 def test_value_that_is_not_finite_is_zero():
     made, shader = shader_material("Broken", "ShaderNodeEmission")
     value = made.node_tree.nodes.new("ShaderNodeValue")
@@ -218,6 +252,8 @@ def test_material_set_by_geometry_nodes_is_worn_by_the_instances():
 
 # World
 
+NO_WORLD_LIGHT = "The world is shown and gives no light yet"
+
 
 def world(strength=1.0, color=(0.1, 0.2, 0.3)):
     made = bpy.context.scene.world = bpy.data.worlds.new("Sky")
@@ -232,7 +268,12 @@ def world(strength=1.0, color=(0.1, 0.2, 0.3)):
 def test_world_color_times_strength():
     world(strength=3)
     scene = convert()
-    assert scene.world.color == rgb(0.3, 0.6, 0.9) and scene.warnings == ()
+    assert scene.world.color == rgb(0.3, 0.6, 0.9) and scene.warnings == (NO_WORLD_LIGHT,)
+
+
+def test_black_world_has_no_line():
+    world(strength=0)
+    assert convert().warnings == ()
 
 
 def test_no_world_is_black():
@@ -246,7 +287,7 @@ def test_world_texture_is_replaced_by_the_sockets_color_with_one_line():
     made.node_tree.links.new(texture.outputs[0], made.node_tree.nodes["Background"].inputs["Color"])
     scene = convert()
     assert scene.world.color == rgb(0.2, 0.4, 0.6)
-    assert len(scene.warnings) == 1 and "'Sky'" in scene.warnings[0]
+    assert len(scene.warnings) == 2 and "'Sky'" in scene.warnings[0] and scene.warnings[1] == NO_WORLD_LIGHT
 
 
 def test_film_settings_are_read():
