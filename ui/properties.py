@@ -16,9 +16,9 @@ def _redraw(_group, context) -> None:
                 area.tag_redraw()
 
 
-def _property(setting: Setting, default: Value, label: str):
-    """Blender's deferred property for one setting."""
-    description = setting.description + (f" (in {setting.unit})" if setting.unit else "")
+def _property(setting: Setting, default: Value, label: str, where: str = ""):
+    """Blender's deferred property for one setting. Its tooltip gets no last period: Blender adds one."""
+    description = where + setting.description + (f". Unit: {setting.unit}" if setting.unit else "")
     common = {"name": label, "description": description, "default": default, "update": _redraw}
     if setting.kind == "ENUM":
         return bpy.props.EnumProperty(items=[(i.key, i.label, i.description) for i in setting.items], **common)
@@ -35,7 +35,8 @@ def _annotations() -> dict[str, object]:
     for name, setting in named_settings():
         result[name] = _property(setting, setting.default, setting.label)
         if setting.viewport_default is not None:
-            result[f"viewport_{name}"] = _property(setting, setting.viewport_default, f"Viewport {setting.label}")
+            label = f"Viewport {setting.label}"
+            result[f"viewport_{name}"] = _property(setting, setting.viewport_default, label, "In the viewport: ")
     return result
 
 

@@ -81,7 +81,10 @@ def test_settings_are_saved_with_the_file(rebound_scene, tmp_path):
 def test_property_states_unit_and_holds_its_limits(rebound_scene, name, setting):
     entry = rebound_scene.rebound.bl_rna.properties[name]
     assert setting.description.rstrip(".") in entry.description
-    assert setting.unit in entry.description
+    assert entry.description.endswith(f". Unit: {setting.unit}" if setting.unit else setting.description)
+    if setting.viewport_default is not None:
+        in_viewport = rebound_scene.rebound.bl_rna.properties[f"viewport_{name}"].description
+        assert in_viewport == f"In the viewport: {entry.description}"
     if setting.kind in ("INT", "FLOAT"):
         setattr(rebound_scene.rebound, name, setting.maximum + 1)
         assert getattr(rebound_scene.rebound, name) == pytest.approx(setting.maximum)
