@@ -61,8 +61,8 @@ SETTINGS = (
             Item(
                 "FILTERED",
                 "Filtered",
-                "One shadow map, blurred by the light's size (PCSS): soft from the first sample, "
-                "approximate where shadows of several objects meet",
+                "One shadow map, blurred by the light's size (PCSS): soft from the first samples, "
+                "approximate for large or near lights and where shadows of several objects meet",
             ),
         ),
     ),

@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 
 import bpy
+import numpy as np
+from PIL import Image
 
 import rebound
 
@@ -46,8 +48,17 @@ def render(scenes: Path, name: str) -> None:
         scene.render.image_settings.media_type = "IMAGE"
     scene.render.image_settings.file_format = "PNG"
     scene.render.image_settings.color_mode = "RGB"
-    scene.render.filepath = str(IMAGES / f"{name}.png")
+    path = IMAGES / f"{name}.png"
+    scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+    _strip(path)
+
+
+def _strip(path: Path) -> None:
+    """Blender writes the file's place on this machine into a picture; keep the pixels only."""
+    with Image.open(path) as picture:
+        pixels = Image.fromarray(np.asarray(picture))
+    pixels.save(path, optimize=True)
 
 
 def main(arguments: list[str]) -> None:
@@ -59,6 +70,7 @@ def main(arguments: list[str]) -> None:
         render(Path(arguments[0]).resolve(), name)
 
 
-main(sys.argv[1:])
-sys.stdout.flush()
-os._exit(0)  # Blender's own exit can take minutes
+if __name__ == "__main__":
+    main(sys.argv[1:])
+    sys.stdout.flush()
+    os._exit(0)  # Blender's own exit can take minutes

@@ -56,8 +56,8 @@ SETTINGS = (
             Item(
                 "DISC_PUBLISHED",
                 "Disc, as Published",
-                "The disc of the 2005 paper with its weights: for comparison; it "
-                "loses near light and all light from beyond the disc",
+                "The disc of the 2005 paper with its weights: for comparison. It "
+                "loses near light and all light from beyond the disc, where it ends with hard edges",
             ),
             Item(
                 "ALL_TEXELS",
@@ -74,7 +74,7 @@ SETTINGS = (
         "memory and of time where all texels are gathered; lower is faster and blurs bounce close to corners",
         256,
         viewport_default=128,
-        minimum=16,
+        minimum=32,
         maximum=2048,
         unit="texels",
     ),

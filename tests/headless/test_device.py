@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
 """The device contract on the standalone device."""
 
 import pytest
