@@ -323,3 +323,36 @@ def test_pixel_at_the_origin_of_a_map_with_empty_texels_is_finite(studio):
     found, points = bounce(studio, picture, ortho(3, 3, 0.3))
     assert np.abs(points[1, 1]).max() < 1e-6
     assert np.isfinite(found).all() and not found.any()
+
+
+# --- large scenes ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SPOT", "AREA"])
+def test_object_at_the_horizon_changes_no_bounce(studio, kind):
+    meshes = [FLOOR, box("block", (-0.4, -0.4, 0), (0.4, 0.4, 0.8))]
+    lamp = light(kind, (1.2, -1.0, 2.4), (0, 0, 0.3), spot_angle=1.2)
+    stray = box("stray", (30000, 0, 0), (30000.1, 0.1, 0.1))
+    view = ortho(24, 24, 2.0, (2, -3, 2), (0, 0, 0.3))
+    alone, _ = bounce(studio, scene(meshes, [lamp]), view)
+    found, _ = bounce(studio, scene([*meshes, stray], [lamp]), view)
+    assert alone.mean() > 0
+    np.testing.assert_allclose(found, alone, rtol=2e-3, atol=2e-3 * alone.max())
+
+
+@pytest.mark.parametrize("half", [300.0, 10000.0])
+def test_ground_to_the_horizon_bounces_as_a_small_one_does(studio, half):
+    """A sun's cascades keep texels small beside a block; what lies beyond 40 m gives it next to nothing."""
+    block = box("block", (-0.5, -0.5, 0), (0.5, 0.5, 1))
+    sun = light("SUN", (1.0, -1.5, 2.0), power=3.0)
+    view = ortho(24, 24, 1.2, (2, -3, 1.5), (0, 0, 0.5))
+    on_side = None
+    means = []
+    for size in (40.0, half):
+        ground = quad("ground", u=(size, 0, 0), v=(0, size, 0))
+        found, points = bounce(studio, scene([ground, block], [sun]), view, resolution=128)
+        on_side = (points[..., 2] > 0.05) & (points[..., 2] < 0.95)
+        means.append(found[on_side].mean())
+    assert on_side is not None and on_side.sum() > 50
+    # A wall sees h / sqrt(h² + D²) of an endless ground's light from beyond D: 1.2 % at half a metre and 40 m.
+    assert means[1] == pytest.approx(1.012 * means[0], rel=0.01)

@@ -276,3 +276,13 @@ def test_filtered_penumbra_is_about_as_wide(studio, name):
     found, x = edge_profile(studio, lamp, "FILTERED", 64)
     assert width_between(np.maximum.accumulate(found), x) == pytest.approx(width_between(part(x), x), rel=0.2)
     assert np.interp(0.5, np.maximum.accumulate(found), x) == pytest.approx(0, abs=0.03)
+
+
+@pytest.mark.parametrize("name", ["point", "spot", "area"])
+def test_object_at_the_horizon_changes_no_shadow(studio, name):
+    """Depth reaches to the farthest object there is, and is as fine beside the lamp as without it."""
+    stray = box("stray", (30000, 0, 0), (30000.1, 0.1, 0.1))
+    view = perspective(40, 40, 55, EYES["box"], (0, 0, 0.3))
+    specks, leaks, lit, dark = check(studio, [*SCENES["box"], stray], LAMPS[name], view, 1.0, "FILTERED")
+    assert lit > 200 and dark > 20
+    assert (specks, leaks) == (0, 0)
