@@ -31,6 +31,8 @@ MOST_HUGE_OBJECTS = 4
 WORTHWHILE_SHRINK = 36.0
 # The narrowest face reaches this part of its width further: the ground around an object bounces most onto it.
 NEAR_MARGIN = 0.5
+# The narrowest face is no narrower than this part of its length.
+NARROWEST = 0.05
 # Each face is so many times as wide as the one inside it: a texel stays a few percent of its distance from what the
 # inner face holds, so the bounce that comes from there is not blurred.
 CASCADE_STEP = 6.0
@@ -177,9 +179,12 @@ def _sun_faces(frame, boxes, to_sun) -> tuple[Face, ...]:
     kept = _without_huge(own_lower, own_upper)
     if kept is None:
         return (_sun_face(rows, *everything, ""),)
-    wide = (own_upper.max(0) - own_lower.min(0))[:2] / (own_upper[kept].max(0) - own_lower[kept].min(0))[:2]
+    wide = (own_upper.max(0) - own_lower.min(0))[:2] / _width(own_lower[kept], own_upper[kept])
     steps = max(math.ceil(math.log(wide.max() / (1.0 + 2.0 * NEAR_MARGIN), CASCADE_STEP)), 1)
     low, high = lower[kept].min(0), upper[kept].max(0)
+    center, half = 0.5 * (low + high), 0.5 * (high - low)
+    half[:2] = 0.5 * _width(lower[kept], upper[kept])
+    low, high = center - half, center + half
     extents = [_widened(low, high, CASCADE_STEP**k, everything) for k in range(steps)] + [everything]
     return tuple(_sun_face(rows, *extent, f"Cascade {number}") for number, extent in enumerate(extents, 1))
 
@@ -213,16 +218,19 @@ def _without_huge(lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
     """Indices of the boxes that remain when the fewest huge ones are left out, None where that gains too little."""
     extent = (upper - lower)[:, :2]
     order = np.argsort(extent.max(1))
-    whole = _area(lower, upper)
+    whole = float(np.prod(_width(lower, upper)))
     for left_out in range(1, min(MOST_HUGE_OBJECTS, len(order) - 1) + 1):
         kept = order[:-left_out]
-        if whole > WORTHWHILE_SHRINK * _area(lower[kept], upper[kept]):
+        area = float(np.prod(_width(lower[kept], upper[kept])))
+        if whole > WORTHWHILE_SHRINK * area > 0.0:
             return kept
     return None
 
 
-def _area(lower: np.ndarray, upper: np.ndarray) -> float:
-    return float(np.prod((upper.max(0) - lower.min(0))[:2]))
+def _width(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """(2,) how wide boxes are together across the light; a plane seen edge-on counts as a little wide."""
+    width = (upper.max(0) - lower.min(0))[:2]
+    return np.maximum(width, NARROWEST * width.max())
 
 
 def _sun_face(rows, lower, upper, name: str) -> Face:

@@ -303,6 +303,18 @@ def test_face_of_a_sheared_spot_holds_its_whole_cone():
     assert holds(face, 0.3 * edge @ sheared[:3, :3].T).all()
 
 
+@pytest.mark.parametrize("size", [(2.0, 0.0, 2.0), (0.0, 0.0, 2.0)], ids=["wall", "pole"])
+def test_thin_object_on_a_huge_ground_is_held_by_finite_faces(size):
+    """Seen along a sun that stands overhead, a wall has no width and a pole none at all."""
+    thin = np.array([np.zeros(3), size])
+    ground = np.array([[-100.0, -100, 0], [100, 100, 0]])
+    faces = light_faces(light("SUN", (0, 0, 0), (0, 0, -1)), np.stack([thin, ground]))
+    assert len(faces) <= 5
+    for face in faces:
+        assert np.isfinite(face.clip_from_world).all()
+        assert holds(face, 0.99 * thin + 0.01 * thin.mean(0)).all()
+
+
 def test_samples_of_a_sun_agree_on_the_number_of_faces():
     boxes = np.concatenate([BOXES, [[[-9.2, -9.2, 0.0], [9.2, 9.2, 0.0]]]])
     sun = light("SUN", (0, 0, 0), (0.3, 0.2, -1), angle=40 * DEGREES)
