@@ -21,11 +21,9 @@ from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
 from .gpu_shaders.rsm.maps import ReflectiveShadowMaps
 from .gpu_shaders.technique import Technique
-from .passes import PASSES, RenderPass
+from .passes import PASSES
 from .scene.data import View, Visibility
-from .settings import SETTINGS, Settings
-
-__all__ = ["PASSES", "SETTINGS", "Frame", "RenderError", "RenderPass", "Renderer", "RsmBuffers", "Settings"]
+from .settings import Settings
 
 # How far a sample is after each step, for the progress bar: about their shares of the time.
 GBUFFER_DONE, DIRECT_DONE, INDIRECT_DONE = 0.1, 0.4, 0.95
@@ -102,7 +100,7 @@ class Renderer:
         self._techniques: dict[str, Technique] = {}
         self._triangles = 0
 
-    def begin(self, view: View, settings: Settings) -> Frame:
+    def begin(self, view: View) -> Frame:
         """An empty frame of the view's size. Raises RenderError where the GPU has no texture of that size."""
         size = (view.width, view.height)
         largest = self.device.max_texture_size
@@ -139,10 +137,10 @@ class Renderer:
         self._accumulate(frame, inputs)
         yield 1.0
 
-    def texture(self, frame: Frame, key: str = "combined") -> Texture:
-        """RGBA32F mean of a summed pass so far, for the screen; valid until the next call."""
+    def texture(self, frame: Frame) -> Texture:
+        """RGBA32F mean of the combined pass so far, for the screen; valid until the next call."""
         weight = 1.0 / max(frame.samples, 1)
-        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums[f"out_{key}"], pc_weight=weight)
+        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums["out_combined"], pc_weight=weight)
         return frame.resolved
 
     def read(self, frame: Frame, key: str) -> np.ndarray:

@@ -162,7 +162,7 @@ class Session:
             return old.frame
         if old:
             old.free()
-        return gpu.renderer.begin(view, settings)
+        return gpu.renderer.begin(view)
 
     def rsm_buffers(self, settings: Settings) -> list[RsmBuffers]:
         """Every light's reflective shadow map, for the scene of the last sync."""

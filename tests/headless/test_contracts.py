@@ -176,7 +176,7 @@ def test_cancelled_sample_leaves_whole_samples_and_no_trace(headless_device, cha
     whole.free()
     studio = Studio(headless_device)
     studio.show(SCENE)
-    frame = studio.renderer.begin(view, settings)
+    frame = studio.renderer.begin(view)
     cancelled = 0
     for samples in range(3):
         pieces_run = 0
@@ -197,4 +197,4 @@ def test_cancelled_sample_leaves_whole_samples_and_no_trace(headless_device, cha
 def test_impossible_size_is_one_line(studio):
     for width, height in ((0, 4), (4, 10**6)):
         with pytest.raises(RenderError, match="not possible"):
-            studio.renderer.begin(replace(VIEWS["1 x 1"], width=width, height=height), Settings.defaults())
+            studio.renderer.begin(replace(VIEWS["1 x 1"], width=width, height=height))

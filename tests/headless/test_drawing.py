@@ -118,7 +118,7 @@ def test_restarted_frame_is_as_good_as_a_new_one(studio):
     first, second = scene([FLOOR], [LAMP]), scene([sphere("ball")], [LAMP])
     expected = studio.render(second, VIEW, 2, PASSES)
     studio.show(first)
-    frame = studio.renderer.begin(VIEW, settings)
+    frame = studio.renderer.begin(VIEW)
     list(studio.renderer.sample(frame, studio.gpu_scene, VIEW, settings))
     studio.show(second)
     studio.renderer.restart(frame)

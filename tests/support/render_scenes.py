@@ -8,9 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from rebound.gpu_scene import GpuScene
-from rebound.renderer import Renderer, Settings
+from rebound.renderer import Renderer
 from rebound.scene.changes import Changes
 from rebound.scene.data import AreaShape, Instance, Light, LightKind, Material, Mesh, Scene, View, Visibility
+from rebound.settings import Settings
 
 Array = np.ndarray
 EVERYTHING = Visibility.CAMERA | Visibility.SHADOW | Visibility.BOUNCE
@@ -203,7 +204,7 @@ class Studio:
         """The named passes as float64, (h, w, channels), row 0 at the bottom."""
         settings = Settings.defaults(**{**QUICK, **changed})
         self.show(scene)
-        frame = self.renderer.begin(view, settings)
+        frame = self.renderer.begin(view)
         try:
             for _ in range(samples):
                 for _ in self.renderer.sample(frame, self.gpu_scene, view, settings):
