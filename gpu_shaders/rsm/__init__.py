@@ -2,7 +2,7 @@
 
 C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
 
-1. Draw the scene from every light: position, normal and reflected flux (``maps``).
+1. Draw the scene from every light: position, normal and reflected flux (``frame.reflective_maps``).
 2. Gather irradiance at every pixel from the texels, each a small Lambertian lamp: from all of them, from
    the paper's disc around the pixel's own place in the map as published, or from that disc with exact weights.
 3. Screen-space interpolation (section 4.2 of the paper): gather on a coarse grid of pixels, reuse where plane and
@@ -22,10 +22,10 @@ import numpy as np
 from ...device.interface import Device, Target, Texture
 from ...device.shader import Shader
 from ..frame.draws import ADD
-from ..frame.inputs import FrameInputs
+from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.maps import Atlas
+from ..frame.reflective_maps import ReflectiveShadowMaps
 from ..technique import Item, Setting, Value
-from .maps import ReflectiveShadowMaps
 from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SHADERS
 
 # Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
@@ -136,8 +136,9 @@ class Rsm:
         self._coarse: tuple[Texture, Target] | None = None
         self._reuse: tuple[Texture, Target] | None = None  # of the target that is interpolated into
 
-    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> Iterator[float]:
-        """Irradiance / pi of one bounce, added to ``target``; see ``Technique.indirect``."""
+    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
+        """Irradiance / pi of one diffuse bounce, added to the indirect diffuse light; see ``Technique.indirect``."""
+        target = targets.diffuse_indirect
         for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
             yield MAPS_DONE * done
         if not inputs.gpu_scene.scene.lights:

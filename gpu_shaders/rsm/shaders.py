@@ -1,32 +1,7 @@
 """Declarations of the passes of reflective shadow maps."""
 
 from ...device.shader import Shader
-from ..frame.shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
-from ..frame.structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
-
-DRAW = Shader(
-    name="rsm_draw",
-    vertex="frame/frame_draw_vert.glsl",
-    fragment="rsm/rsm_draw_frag.glsl",
-    inputs=MESH_INPUTS,
-    varyings=MESH_VARYINGS,
-    outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4"},
-    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
-    structs=(INSTANCE, MATERIAL, LIGHT, MAP_FACE),
-    constants={
-        "pc_clip_from_world": "MAT4",
-        "pc_first_instance": "INT",
-        "pc_material": "INT",
-        "pc_reflects": "INT",
-        "pc_light": "INT",
-        "pc_perspective": "INT",
-        "pc_far": "FLOAT",
-        "pc_texel_measure": "FLOAT",  # see rsm_draw_frag.glsl
-        "pc_served": "INT",
-    },
-    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES),
-    depth_write=True,
-)
+from ..frame.structs import LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE
 
 _GATHER = {
     "position_tx": "FLOAT_2D",
@@ -81,4 +56,4 @@ INTERPOLATE = Shader(
     constants=_GRID,
 )
 
-SHADERS = (DRAW, GATHER_ALL, GATHER_PUBLISHED, GATHER_EXACT, INTERPOLATE)
+SHADERS = (GATHER_ALL, GATHER_PUBLISHED, GATHER_EXACT, INTERPOLATE)

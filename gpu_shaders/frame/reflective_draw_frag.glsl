@@ -7,7 +7,7 @@
 
 /* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond
  * this cosine. */
-const float RSM_GRAZING = 1e-2;
+const float REFLECTIVE_GRAZING = 1e-2;
 
 void main()
 {
@@ -40,7 +40,7 @@ void main()
   vec3 flux = light_intensity(light, -d) * measure * albedo;
   /* A disc that turns to the receiver gives 1 / (d^2 + r^2) where a point gives 1 / d^2. */
   flux *= distance_squared / (distance_squared + light.soft_radius_squared);
-  float area = measure * distance_squared / max(dot(geometric, d), RSM_GRAZING);
+  float area = measure * distance_squared / max(dot(geometric, d), REFLECTIVE_GRAZING);
 
   gl_FragDepth = pc_perspective != 0 ? map_depth(1.0 / (pc_far * gl_FragCoord.w)) : clamp(gl_FragCoord.z, 0.0, 1.0);
   out_position_area = vec4(v_position, area);

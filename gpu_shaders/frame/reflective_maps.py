@@ -9,13 +9,13 @@ import numpy as np
 
 from ...device.interface import Device, Texture
 from ...scene.data import Visibility
-from ..frame.draws import draw_scene, material_of, visible_draws
-from ..frame.light_maps import LightMaps, MapTile
-from ..frame.lights import light_row
-from ..frame.maps import light_faces
-from ..frame.structs import LIGHT
-from ..frame.tables import replace_table
-from .shaders import DRAW
+from .draws import draw_scene, material_of, visible_draws
+from .light_maps import LightMaps, MapTile
+from .lights import light_row
+from .maps import light_faces
+from .structs import LIGHT
+from .tables import replace_table
+from .reflective_shaders import REFLECT
 
 if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
@@ -89,7 +89,7 @@ class ReflectiveShadowMaps(LightMaps):
         draw_scene(
             self.device,
             gpu_scene,
-            DRAW,
+            REFLECT,
             target,
             draws,
             each,

@@ -1,0 +1,29 @@
+"""Declaration of the pass that draws reflective shadow maps."""
+
+from ...device.shader import Shader
+from .shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
+from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+
+REFLECT = Shader(
+    name="frame_reflective_draw",
+    vertex="frame/frame_draw_vert.glsl",
+    fragment="frame/reflective_draw_frag.glsl",
+    inputs=MESH_INPUTS,
+    varyings=MESH_VARYINGS,
+    outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4"},
+    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
+    structs=(INSTANCE, MATERIAL, LIGHT, MAP_FACE),
+    constants={
+        "pc_clip_from_world": "MAT4",
+        "pc_first_instance": "INT",
+        "pc_material": "INT",
+        "pc_reflects": "INT",
+        "pc_light": "INT",
+        "pc_perspective": "INT",
+        "pc_far": "FLOAT",
+        "pc_texel_measure": "FLOAT",  # see reflective_draw_frag.glsl
+        "pc_served": "INT",
+    },
+    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES),
+    depth_write=True,
+)
