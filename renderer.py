@@ -16,10 +16,10 @@ from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.direct import DirectLight
 from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
-from .gpu_shaders.frame.inputs import FrameInputs, GBuffer
+from .gpu_shaders.frame.inputs import FrameInputs, GBuffer, LightTargets
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
-from .gpu_shaders.rsm.maps import ReflectiveShadowMaps
+from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
 from .gpu_shaders.technique import Technique
 from .passes import PASSES
 from .scene.data import View, Visibility
@@ -43,10 +43,9 @@ class Frame:
     height: int
     gbuffer: GBuffer
     gbuffer_target: Target
-    direct: Texture
-    direct_target: Target
-    indirect: Texture
-    indirect_target: Target
+    light: LightTargets
+    direct_target: Target  # both direct ones of ``light``
+    indirect_target: Target  # both indirect ones
     sums: Mapping[str, Texture]  # by the names of ACCUMULATE's outputs
     sum_target: Target
     geometry: tuple[Texture, Texture]  # position and depth, normal: of the first sample
@@ -60,6 +59,7 @@ class Frame:
         """Everything to free: framebuffers before their textures."""
         targets = (
             self.gbuffer_target,
+            *self._lights,
             self.direct_target,
             self.indirect_target,
             self.sum_target,
@@ -69,13 +69,17 @@ class Frame:
         textures = (
             *self.gbuffer.colors,
             self.gbuffer.depth,
-            self.direct,
-            self.indirect,
+            *(target.colors[0] for target in self._lights),
             *self.sums.values(),
             *self.geometry,
             self.resolved,
         )
         return (*targets, *textures)
+
+    @property
+    def _lights(self) -> tuple[Target, ...]:
+        light = self.light
+        return light.diffuse_direct, light.diffuse_indirect, light.glossy_direct, light.glossy_indirect
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,19 +124,19 @@ class Renderer:
 
         Stop iterating to cancel: the frame then still is the mean of its whole samples.
         """
-        inputs = FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, int(settings["seed"]))
+        inputs = _inputs(frame, gpu_scene, view, int(settings["seed"]))
         self._triangles = gpu_scene.triangle_count
         self._draw_gbuffer(frame, inputs)
         yield GBUFFER_DONE
         self.device.clear(frame.direct_target)
         filtered = settings["soft_shadows"] == "FILTERED"
         resolution = int(settings["shadow_resolution"])
-        for done in self._direct.draw(inputs, frame.direct_target, filtered=filtered, resolution=resolution):
+        for done in self._direct.draw(inputs, frame.light.diffuse_direct, filtered=filtered, resolution=resolution):
             yield GBUFFER_DONE + (DIRECT_DONE - GBUFFER_DONE) * done
         self.device.clear(frame.indirect_target)
         technique = self._technique(settings)
         if technique is not None:
-            for done in technique.indirect(inputs, settings.of(technique.id), frame.indirect_target):
+            for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         self._accumulate(frame, inputs)
         yield 1.0
@@ -200,13 +204,6 @@ class Renderer:
         return self._techniques.get(wanted)
 
     def _draw_gbuffer(self, frame: Frame, inputs: FrameInputs) -> None:
-        view = inputs.view
-        offset = pixel_offset(inputs.sample, inputs.gpu_scene.scene.filter_width)
-        jitter = np.eye(4)
-        jitter[:2, 3] = 2 * offset / (view.width, view.height)
-        clip_from_world = jitter @ view.clip_from_view @ view.view_from_world
-        world_from_view = np.linalg.inv(view.view_from_world)
-        eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
         self.device.clear(frame.gbuffer_target)
 
         def each(draw: Draw) -> dict:
@@ -221,8 +218,8 @@ class Renderer:
             visible_draws(inputs.gpu_scene, Visibility.CAMERA | Visibility.HOLDOUT),
             each,
             material_tx=inputs.gpu_scene.material_table,
-            pc_clip_from_world=clip_from_world,
-            pc_eye=eye,
+            pc_clip_from_world=inputs.clip_from_world,
+            pc_eye=inputs.eye,
         )
 
     def _accumulate(self, frame: Frame, inputs: FrameInputs) -> None:
@@ -234,8 +231,10 @@ class Renderer:
             state=ADD,
             albedo_tx=gbuffer.albedo,
             emission_tx=gbuffer.emission,
-            direct_tx=frame.direct,
-            indirect_tx=frame.indirect,
+            diffuse_direct_tx=frame.light.diffuse_direct.colors[0],
+            diffuse_indirect_tx=frame.light.diffuse_indirect.colors[0],
+            glossy_direct_tx=frame.light.glossy_direct.colors[0],
+            glossy_indirect_tx=frame.light.glossy_indirect.colors[0],
             pc_background=background,
         )
         if frame.samples == 0:
@@ -249,14 +248,37 @@ class Renderer:
         frame.samples += 1
 
 
+def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameInputs:
+    """Everything that the passes of the frame's next sample share."""
+    offset = pixel_offset(frame.samples, gpu_scene.scene.filter_width)
+    jitter = np.eye(4)
+    jitter[:2, 3] = 2 * offset / (view.width, view.height)
+    clip_from_world = jitter @ view.clip_from_view @ view.view_from_world
+    world_from_view = np.linalg.inv(view.view_from_world)
+    eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
+    return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world)
+
+
 def _new_frame(device: Device, width: int, height: int) -> Frame:
     def texture(name: str) -> Texture:
         return device.texture((width, height), name)
 
     gbuffer = GBuffer(
-        texture("RGBA16F"), texture("RGBA32F"), texture("RGBA32F"), texture("RGBA32F"), texture("DEPTH32F")
+        albedo=texture("RGBA16F"),
+        emission=texture("RGBA32F"),
+        position=texture("RGBA32F"),
+        normal=texture("RGBA32F"),
+        specular=texture("RGBA16F"),
+        depth=texture("DEPTH32F"),
     )
-    direct, indirect, resolved = texture("RGBA32F"), texture("RGBA32F"), texture("RGBA32F")
+    diffuse_direct, diffuse_indirect, glossy_direct, glossy_indirect = (texture("RGBA32F") for _ in range(4))
+    light = LightTargets(
+        device.target([diffuse_direct]),
+        device.target([diffuse_indirect]),
+        device.target([glossy_direct]),
+        device.target([glossy_indirect]),
+    )
+    resolved = texture("RGBA32F")
     sums = {name: texture("RGBA32F") for name in SUMS}
     geometry = (texture("RGBA32F"), texture("RGBA32F"))
     return Frame(
@@ -264,10 +286,9 @@ def _new_frame(device: Device, width: int, height: int) -> Frame:
         height,
         gbuffer,
         device.target(gbuffer.colors, gbuffer.depth),
-        direct,
-        device.target([direct]),
-        indirect,
-        device.target([indirect]),
+        light,
+        device.target([diffuse_direct, glossy_direct]),
+        device.target([diffuse_indirect, glossy_indirect]),
         sums,
         device.target(list(sums.values())),
         geometry,

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
 if TYPE_CHECKING:
-    from ..device.interface import Device, Target
+    from ..device.interface import Device
     from ..device.shader import Shader
-    from .frame.inputs import FrameInputs
+    from .frame.inputs import FrameInputs, LightTargets
 
 Value = float | int | bool | str
 
@@ -59,8 +59,10 @@ class Technique(Protocol):
 
     def __init__(self, device: Device) -> None: ...
 
-    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> Iterator[float]:
-        """Write this sample's indirect irradiance / pi into ``target`` (RGBA32F, one colour, cleared before).
+    def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
+        """Add this sample's indirect light to ``targets``.
+
+        The indirect ones are zero before and may be overwritten; the direct ones hold the sample's direct light.
 
         ``settings`` holds this technique's values by their short names. Yields its progress (0..1) after every
         bounded piece of GPU work, so that a caller can show it and cancel between two pieces.

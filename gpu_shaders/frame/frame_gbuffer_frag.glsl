@@ -8,6 +8,7 @@ void main()
   vec3 normal = surface_shading_normal(v_normal, geometric);
   out_position = vec4(v_position, 1.0);
   out_normal = vec4(octahedron_encode(normal), octahedron_encode(geometric));
+  out_specular = vec4(0.0);
   if (pc_holdout != 0) {
     out_albedo = vec4(0.0, 0.0, 0.0, -1.0);
     out_emission = vec4(0.0);

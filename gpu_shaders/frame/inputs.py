@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...device.interface import Texture
+import numpy as np
+
+from ...device.interface import Target, Texture
 from ...scene.data import View
 
 if TYPE_CHECKING:
@@ -24,29 +26,51 @@ class GBuffer:
 
     ``albedo`` RGBA16F: diffuse reflectance; a: 1 surface, 0 background, -1 holdout. ``emission`` RGBA32F radiance.
     ``position`` RGBA32F world position, w 1 where there is a surface. ``normal`` RGBA32F: shading normal and
-    geometric normal, both octahedral and on the camera's side.
+    geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F: specular reflectance at normal
+    incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the square root of GGX's alpha.
     """
 
     albedo: Texture
     emission: Texture
     position: Texture
     normal: Texture
+    specular: Texture
     depth: Texture
 
     @property
     def colors(self) -> Sequence[Texture]:
-        return (self.albedo, self.emission, self.position, self.normal)
+        return (self.albedo, self.emission, self.position, self.normal, self.specular)
+
+
+@dataclass(frozen=True, eq=False)
+class LightTargets:
+    """Where a sample's light goes: four targets of one RGBA32F colour each, one texel a pixel.
+
+    The diffuse ones hold irradiance / pi, which the albedo is not in; the glossy ones radiance toward the eye, which
+    the specular reflectance is in.
+    """
+
+    diffuse_direct: Target
+    diffuse_indirect: Target
+    glossy_direct: Target
+    glossy_indirect: Target
 
 
 @dataclass(frozen=True, eq=False)
 class FrameInputs:
-    """One sample of one frame. ``seed`` is the frame's, the same for all of its samples."""
+    """One sample of one frame. ``seed`` is the frame's, the same for all of its samples.
+
+    ``eye`` is the camera's position and 1, or for an orthographic view the unit direction to it and 0.
+    ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer was drawn by it.
+    """
 
     gpu_scene: GpuScene
     gbuffer: GBuffer
     view: View
     sample: int
     seed: int
+    eye: tuple[float, float, float, float]
+    clip_from_world: np.ndarray
 
     def noise_seed(self, stream: int) -> int:
         """A seed for sampling_hash(), the same for all samples: they walk along one sequence in every pixel, which

@@ -18,7 +18,13 @@ GBUFFER = Shader(
     fragment="frame/frame_gbuffer_frag.glsl",
     inputs=MESH_INPUTS,
     varyings=MESH_VARYINGS,
-    outputs={"out_albedo": "VEC4", "out_emission": "VEC4", "out_position": "VEC4", "out_normal": "VEC4"},
+    outputs={
+        "out_albedo": "VEC4",
+        "out_emission": "VEC4",
+        "out_position": "VEC4",
+        "out_normal": "VEC4",
+        "out_specular": "VEC4",
+    },
     samplers=MESH_SAMPLERS,
     structs=(INSTANCE, MATERIAL),
     constants={
@@ -82,8 +88,10 @@ ACCUMULATE = Shader(
     samplers={
         "albedo_tx": "FLOAT_2D",
         "emission_tx": "FLOAT_2D",
-        "direct_tx": "FLOAT_2D",
-        "indirect_tx": "FLOAT_2D",
+        "diffuse_direct_tx": "FLOAT_2D",
+        "diffuse_indirect_tx": "FLOAT_2D",
+        "glossy_direct_tx": "FLOAT_2D",
+        "glossy_indirect_tx": "FLOAT_2D",
     },
     constants={"pc_background": "VEC4"},
 )
