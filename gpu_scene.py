@@ -33,6 +33,8 @@ class Draw:
     material: int
     visibility: Visibility
     bounds: np.ndarray  # (2, 3) float64: of all its instances, world space
+    mesh: Mesh
+    uv_maps: UvMaps
 
 
 class GpuScene:
@@ -43,6 +45,7 @@ class GpuScene:
         self.scene = Scene()
         self.uploads: Counter[str] = Counter()
         self.draws: tuple[Draw, ...] = ()
+        self.matrices = np.zeros((0, 4, 4))  # float64 world_from_object of every row of the table of instances
         self.boxes = np.zeros((1, 2, 3))  # world boxes of all instances, a point at the origin for an empty scene
         self.revision = 0  # grows with every update that changes something
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
@@ -139,11 +142,12 @@ class GpuScene:
                 wanted.add((mesh_key, maps))
                 vertices = self._vertices(mesh, maps)
                 place = (3 * first, 3 * count, len(matrices), len(members), material, visibility, bounds)
-                draws.append(Draw(vertices, *place))
+                draws.append(Draw(vertices, *place, mesh, maps))
             matrices += [member.world_from_object for member in members]
         for key in self._meshes.keys() - wanted:
             self.device.free(self._meshes.pop(key))
-        packed = INSTANCE.pack_arrays(len(matrices), world_from_object=np.array(matrices).reshape(-1, 4, 4))
+        self.matrices = np.array(matrices, np.float64).reshape(-1, 4, 4)
+        packed = INSTANCE.pack_arrays(len(matrices), world_from_object=self.matrices)
         self.instance_table = replace_table(self.device, packed, self.instance_table)
         self.draws = tuple(draws)
         self.boxes = np.concatenate(every_box) if every_box else np.zeros((1, 2, 3))
