@@ -1,0 +1,28 @@
+/* One point of a surface, placed in the world by its instance's matrix. */
+#include "frame/surface_lib.glsl"
+#include "lib/instance_lib.glsl"
+#include "lib/math_lib.glsl"
+
+void main()
+{
+  SurfacePoint point = surface_point_fetch(point_tx, v_point);
+  mat4 world_from_object = instance_fetch(instance_tx, point.instance).world_from_object;
+  vec3 geometric = instance_normal(world_from_object, point.geometric_normal);
+  float size = length(geometric);
+  geometric = size > 0.0 ? geometric / size : vec3(0.0, 0.0, 1.0);
+  vec3 normal = surface_shading_normal(instance_normal(world_from_object, point.normal), geometric);
+  Surface surface = surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, point.base_uv,
+                                     point.emission_uv);
+
+  out_position_area = vec4((world_from_object * vec4(point.position, 1.0)).xyz, point.area);
+  if (pc_emits != 0) {
+    /* What leaves a surface does so by its true cosine, whatever its shading. */
+    out_normal = vec4(geometric, 2.0);
+    out_flux = vec4(MATH_PI * point.area * max(surface.emission, vec3(0.0)), 1.0);
+    out_reflectance = vec4(0.0);
+  } else {
+    out_normal = vec4(normal, 1.0);
+    out_flux = vec4(0.0, 0.0, 0.0, 1.0);
+    out_reflectance = vec4(surface.albedo, 1.0);
+  }
+}

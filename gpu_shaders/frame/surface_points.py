@@ -1,0 +1,172 @@
+"""Points of the scene's surfaces drawn into a tile of textures: one texel a point."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ...device.interface import Device, Target, Texture, Viewport
+from ...device.shader import Shader
+from ...device.structs import Struct
+from ...scene.data import Material, Visibility
+from ...scene.surface_points import Part, Points, SurfaceSampler, emission_density, gram_matrices
+from .draws import visible_draws
+from .shaders import MESH_SAMPLERS
+from .structs import IMAGE_DEFINES, INSTANCE, MATERIAL
+from .tables import replace_table
+
+if TYPE_CHECKING:
+    from ...gpu_scene import Draw, GpuScene
+
+SIDES = 2  # of every surface; a point is on one of them and stands for the other's area too
+# Change of a squared length, as a part of the largest, that the rounding of a rotation may cause.
+SAME_SHAPE = 1e-5
+
+SURFACE_POINT = Struct(
+    "SurfacePoint",
+    position="vec3",  # object space, as all of it
+    instance="int",
+    normal="vec3",
+    area="float",  # m², world
+    geometric_normal="vec3",
+    texel="int",
+    base_uv="vec2",
+    emission_uv="vec2",
+)
+
+SURFACE_POINT_DRAW = Shader(
+    name="surface_point_draw",
+    vertex="frame/surface_point_draw_vert.glsl",
+    fragment="frame/surface_point_draw_frag.glsl",
+    varyings={"v_point": "flat INT"},
+    outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_reflectance": "VEC4"},
+    samplers={**MESH_SAMPLERS, "point_tx": "FLOAT_2D"},
+    structs=(INSTANCE, MATERIAL, SURFACE_POINT),
+    constants={"pc_first_point": "INT", "pc_side": "INT", "pc_material": "INT", "pc_emits": "INT"},
+    defines=IMAGE_DEFINES,
+)
+
+
+class SurfacePoints:
+    """A square of points: of kind AREA spread evenly over all that reflects, of EMISSION by what is emitted.
+
+    Colour textures: world position and area (RGBA32F), unit normal and 1 (AREA) or 2 (EMISSION), flux in watts
+    (RGBA32F; AREA: 0), diffuse reflectance (EMISSION: 0). A point is on one side of its surface and its area is of
+    sides: all areas add up to SIDES times ``total_area``, and flux is pi times radiance times area. Points of AREA have
+    the shading normal, those of EMISSION the geometric one.
+    """
+
+    def __init__(self, device: Device, kind: Literal["AREA", "EMISSION"]) -> None:
+        self.device = device
+        self.kind = kind
+        self.count = 0
+        self.total_area = 0.0  # m², of the surfaces that the points are on
+        self._sampler = SurfaceSampler()
+        self._image_means: dict[Hashable, np.ndarray] = {}
+        self._table: Texture | None = None
+        self._runs: tuple[tuple[int, int, int], ...] = ()  # material, first row of the table, rows
+        self._seen: tuple = ()  # what of the scene the last update looked at
+        self._sampled: tuple = ()  # what the points depend on, but the instances' shapes
+        self._shapes = np.zeros((0, 3, 3))
+        self._rows = np.zeros(0, np.int64)  # instances that have points
+
+    def update(self, gpu_scene: GpuScene, side: int, seed: int = 0) -> bool:
+        """Have ``side`` x ``side`` points, none where nothing has an area; True: they must be drawn anew.
+
+        New points are made only when shapes, their scales, what there is or the shares of emission differ.
+        """
+        scene = gpu_scene.scene
+        seen = gpu_scene.draws, gpu_scene.matrices, scene.materials, side, seed
+        before, self._seen = self._seen, seen
+        if before and all(a is b or (i > 1 and a == b) for i, (a, b) in enumerate(zip(before, seen, strict=True))):
+            return False
+        parts = self._parts(gpu_scene)
+        shapes = gram_matrices(gpu_scene.matrices)
+        sampled = tuple(part.layout for part in parts), side, seed
+        if sampled != self._sampled or not self._same_shapes(shapes):
+            self._make(parts, gpu_scene.matrices, side * side, seed)
+            self._sampled, self._shapes = sampled, shapes
+            return True
+        return self._looks_different(before, gpu_scene)
+
+    def draw(self, gpu_scene: GpuScene, target: Target, viewport: Viewport) -> None:
+        """Fill the tile ``viewport``, of the updated side; texels without a point are zero."""
+        self.device.clear(target, viewport=viewport)
+        if not self.count:
+            return
+        shared = {
+            "instance_tx": gpu_scene.instance_table,
+            "material_tx": gpu_scene.material_table,
+            "point_tx": self._table,
+            "pc_side": viewport[2],
+            "pc_emits": int(self.kind == "EMISSION"),
+        }
+        with self.device.drawing(SURFACE_POINT_DRAW, target, viewport=viewport, **shared) as draw_call:
+            for material, first, count in self._runs:
+                textures = gpu_scene.textures_of(material)
+                draw_call(count=3 * count, pc_first_point=first, pc_material=material, **textures)
+
+    def free(self) -> None:
+        self.device.free(self._table)
+        self._table = None
+        self._seen = self._sampled = self._runs = ()
+        self.count = 0
+
+    def _parts(self, gpu_scene: GpuScene) -> list[Part]:
+        scene = gpu_scene.scene
+        draws = visible_draws(gpu_scene, Visibility.BOUNCE)
+        if self.kind == "AREA":
+            return [_part(draw, 1.0) for draw in draws]
+        self._image_means = {key: mean for key, mean in self._image_means.items() if key in scene.images}
+        densities = [emission_density(m, scene, self._image_means) for m in scene.materials]
+        # Against the brightest, in a single's precision: dimming all emitters alike moves no point.
+        shares = (np.array(densities) / max(*densities, 1e-30)).astype(np.float32).tolist()
+        return [_part(draw, shares[draw.material]) for draw in draws if shares[draw.material] > 0.0]
+
+    def _same_shapes(self, shapes: np.ndarray) -> bool:
+        """Compared with the shapes that the points were made for, so that small changes add up."""
+        old = self._shapes[self._rows]
+        tolerance = SAME_SHAPE * np.abs(old).max((1, 2), initial=0.0)[:, None, None]
+        return bool((np.abs(shapes[self._rows] - old) <= tolerance).all())
+
+    def _looks_different(self, before: tuple, gpu_scene: GpuScene) -> bool:
+        """Whether anything moved or another look came to anything that has points."""
+        moved = before[1] is not gpu_scene.matrices and not np.array_equal(
+            before[1][self._rows], gpu_scene.matrices[self._rows]
+        )
+        old: tuple[Material, ...] = before[2]
+        return moved or any(old[m] != gpu_scene.scene.materials[m] for m, _, _ in self._runs)
+
+    def _make(self, parts: list[Part], matrices: np.ndarray, count: int, seed: int) -> None:
+        points = self._sampler.sample(parts, matrices, count, seed)
+        self.count = len(points)
+        self.total_area = float(points.weights.sum())
+        rows = [np.arange(p.first_instance, p.first_instance + p.instance_count) for p in parts]
+        self._rows = np.unique(np.concatenate([np.zeros(0, np.int64), *rows]))
+        order = np.argsort(points.materials, kind="stable")
+        used, first, counts = np.unique(points.materials[order], return_index=True, return_counts=True)
+        self._runs = tuple(zip(used.tolist(), first.tolist(), counts.tolist(), strict=True))
+        self._table = replace_table(self.device, _packed(points, order), self._table)
+
+
+def _part(draw: Draw, density: float) -> Part:
+    triangles = draw.first_vertex // 3, draw.vertex_count // 3
+    instances = draw.first_instance, draw.instance_count
+    return Part(draw.mesh, *triangles, *instances, draw.material, draw.uv_maps, density)
+
+
+def _packed(points: Points, order: np.ndarray) -> np.ndarray:
+    """Rows of SURFACE_POINT, those of one material together."""
+    return SURFACE_POINT.pack_arrays(
+        len(points),
+        position=points.positions[order],
+        instance=points.instances[order],
+        normal=points.normals[order],
+        area=SIDES * points.weights[order],
+        geometric_normal=points.geometric_normals[order],
+        texel=order,
+        base_uv=points.base_uvs[order],
+        emission_uv=points.emission_uvs[order],
+    )

@@ -1,0 +1,276 @@
+"""Points spread over the scene's triangles by area, or by the light that they emit. Plain numpy, no GPU.
+
+The triangles of a mesh are sorted once by the direction they face, into the cells of ``_cells``, with a running sum of
+their areas. A cell of a placed mesh is then one entry of the distribution: its world area follows from the instance's
+matrix alone, whatever its scale, and rigid moves change nothing. What a cell's area is estimated wrongly by (only where
+it is curved and scaled unevenly) the weight of each point makes good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .data import Array, Material, Mesh, Scene
+
+# Rec. 709 luminance of scene-linear RGB.
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Cells along each side of a face of the cube that directions are sorted by. Odd: the axes lie in the middle of cells.
+_CELLS_A_SIDE = 3
+# Pairs (i, j) of the six different elements of a symmetric matrix, and how often each counts in a product of two.
+_PAIRS, _TIMES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)), np.array([1.0, 1, 1, 2, 2, 2])
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A run of triangles of one mesh with one material, placed by some rows of the table of instances."""
+
+    mesh: Mesh
+    first_triangle: int
+    triangle_count: int
+    first_instance: int
+    instance_count: int
+    material: int
+    uv_maps: tuple[str, str]  # of base colour and emission, "" for none
+    density: float = 1.0  # how many points an area gets, against other parts
+
+    @property
+    def key(self) -> tuple[Hashable, int, int]:
+        return self.mesh.key, self.first_triangle, self.triangle_count
+
+    @property
+    def layout(self) -> tuple:
+        """All but the matrices that points depend on."""
+        return self.key, self.first_instance, self.instance_count, self.material, self.uv_maps, self.density
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """n points in object space. Any run of them is spread as evenly as all of them are, if thinner.
+
+    ``weights`` are m² of the world: the area that a point stands for, both sides of it taken as one surface, so that
+    they add up to the area of all surfaces. Normals are on the side that the point is on; either is as likely.
+    """
+
+    instances: Array  # (n,) int64: row in the table of instances
+    materials: Array  # (n,) int64
+    positions: Array  # (n, 3) float64
+    normals: Array  # (n, 3) float64: shading normal, interpolated and not unit
+    geometric_normals: Array  # (n, 3) float64: unit normal of the triangle
+    base_uvs: Array  # (n, 2) float64
+    emission_uvs: Array  # (n, 2) float64
+    weights: Array  # (n,) float64, m²
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+
+_NO_POINTS = Points(
+    *(np.zeros(0, np.int64) for _ in range(2)),
+    *(np.zeros((0, 3)) for _ in range(3)),
+    *(np.zeros((0, 2)) for _ in range(2)),
+    np.zeros(0),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """The triangles of a part, sorted by cell. Only cells with an area are listed."""
+
+    order: Array  # (t,) int32: number within the part
+    areas: Array  # (t,) float64: running sum in that order, object space
+    starts: Array  # (cells + 1,) float64: the running sum ahead of each cell, and all of it
+    moments: Array  # (cells, 6) float64: sum of area times normal times normal transposed, by _PAIRS
+
+    @property
+    def cells(self) -> int:
+        return len(self.moments)
+
+
+@dataclass(frozen=True, eq=False)
+class _Entries:
+    """The distribution that points are drawn from: a row for each cell of each placed part."""
+
+    sums: Array  # (e,) float64: running sum of estimated area times density
+    starts: Array  # (parts + 1,) int: the first entry of each part
+
+    @property
+    def total(self) -> float:
+        return float(self.sums[-1]) if len(self.sums) else 0.0
+
+
+class SurfaceSampler:
+    """Draws points; keeps what it found out about each mesh for as long as that is asked for."""
+
+    def __init__(self) -> None:
+        self._triangles: dict[Hashable, _Triangles] = {}
+
+    def sample(self, parts: Sequence[Part], matrices: Array, count: int, seed: int = 0) -> Points:
+        """``count`` points, or none where nothing has an area. matrices: (n, 4, 4) of all instances."""
+        triangles = self._sorted(parts)
+        cofactors = cofactor_matrices(matrices)
+        entries = _list_entries(parts, triangles, cofactors)
+        if count < 1 or entries.total <= 0.0:
+            return _NO_POINTS
+        numbers = _low_discrepancy(count, seed)
+        # A point's first number tells its side and its place in the distribution: each side is covered evenly.
+        side, place = np.divmod(2.0 * numbers[:, 0], 1.0)
+        chosen, within, shares = _choose(entries, place)
+        part = np.searchsorted(entries.starts, chosen, "right") - 1
+        offset = chosen - entries.starts[part]
+        cells = np.array([t.cells for t in triangles], np.int64)
+        row, cell = np.divmod(offset, cells[part])
+        instances = np.array([p.first_instance for p in parts], np.int64)[part] + row
+        corners = _gather(parts, triangles, part, cell, within)
+        points = _place(corners, numbers[:, 1:], np.where(side < 1.0, 1.0, -1.0))
+        stretch = np.linalg.norm(np.einsum("nij,nj->ni", cofactors[instances], points["geometric_normals"]), axis=1)
+        weights = corners["cell_area"] * stretch / (count * shares)
+        materials = np.array([p.material for p in parts], np.int64)[part]
+        return Points(instances=instances, materials=materials, weights=weights, **points)
+
+    def _sorted(self, parts: Sequence[Part]) -> list[_Triangles]:
+        wanted = {part.key: part for part in parts}
+        kept = {key: known for key, known in self._triangles.items() if key in wanted}
+        self._triangles = kept | {key: _sorted_triangles(part) for key, part in wanted.items() if key not in kept}
+        return [self._triangles[part.key] for part in parts]
+
+
+def emission_density(material: Material, scene: Scene, image_means: dict[Hashable, Array]) -> float:
+    """Luminance of what a material emits, on average over its image. ``image_means`` remembers those of images."""
+    emission = np.asarray(material.emission, np.float64)
+    lookup = material.emission_texture
+    if lookup is not None and emission.any() and lookup.image in scene.images:
+        if lookup.image not in image_means:
+            image_means[lookup.image] = scene.images[lookup.image].pixels[..., :3].mean((0, 1), dtype=np.float64)
+        emission = emission * image_means[lookup.image]
+    return float(np.maximum(emission, 0.0) @ LUMINANCE)
+
+
+def cofactor_matrices(matrices: Array) -> Array:
+    """(n, 3, 3) that take an area vector (a normal as long as its area) of (n, 4, 4) matrices' space to the world."""
+    x, y, z = (np.asarray(matrices, np.float64)[:, :3, k] for k in range(3))
+    return np.stack((np.cross(y, z), np.cross(z, x), np.cross(x, y)), axis=-1)
+
+
+def gram_matrices(matrices: Array) -> Array:
+    """(n, 3, 3): what of (n, 4, 4) matrices no rigid move changes."""
+    linear = np.asarray(matrices, np.float64)[:, :3, :3]
+    return linear.swapaxes(1, 2) @ linear
+
+
+def _sorted_triangles(part: Part) -> _Triangles:
+    """Area, direction and moments of every triangle of a part; a second's work for some ten million of them."""
+    last = part.first_triangle + part.triangle_count
+    corners = part.mesh.positions[3 * part.first_triangle : 3 * last].reshape(-1, 3, 3)
+    a, b = (np.ascontiguousarray((corners[:, k] - corners[:, 0]).T) for k in (1, 2))
+    normal = np.stack([a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))])
+    doubled = np.sqrt((normal * normal).sum(0))
+    cell = _cells(normal)
+    count = 3 * _CELLS_A_SIDE**2
+    order = np.argsort(cell, kind="stable").astype(np.int32)
+    sums = np.cumsum(doubled[order], dtype=np.float64) * 0.5
+    ends = np.cumsum(np.bincount(cell, minlength=count))
+    starts = np.concatenate(([0.0], sums))[np.concatenate(([0], ends))]
+    with np.errstate(all="ignore"):
+        scaled = np.where(doubled > 0.0, normal / doubled, 0.0)
+    moments = [np.bincount(cell, 0.5 * normal[i] * scaled[j], count) for i, j in _PAIRS]
+    used = np.flatnonzero(np.diff(starts) > 0.0)
+    kept = np.concatenate((starts[used], starts[-1:]))
+    return _Triangles(order, sums, kept, np.stack(moments, -1)[used])
+
+
+def _cells(normal: Array) -> Array:
+    """(t,) uint8: which way (3, t) normals point, a line's two directions being one."""
+    size = np.abs(normal)
+    axis = np.where(size[0] >= np.maximum(size[1], size[2]), 0, np.where(size[1] >= size[2], 1, 2))
+    number = axis.astype(np.uint8)
+    along = np.choose(axis, normal)
+    for turn in (1, 2):
+        across = np.choose(axis, [normal[(k + turn) % 3] for k in range(3)])
+        with np.errstate(all="ignore"):
+            place = np.nan_to_num((across / along + 1.0) * (0.5 * _CELLS_A_SIDE))
+        number = number * _CELLS_A_SIDE + np.clip(place, 0, _CELLS_A_SIDE - 1).astype(np.uint8)
+    return number
+
+
+def _list_entries(parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array) -> _Entries:
+    # The square of an area vector's stretch is a quadratic form of its direction.
+    squares = cofactors.swapaxes(1, 2) @ cofactors
+    forms = np.stack([squares[:, i, j] for i, j in _PAIRS], -1) * _TIMES
+    measures, starts = [np.zeros(0)], [0]
+    for part, known in zip(parts, triangles, strict=True):
+        rows = forms[part.first_instance : part.first_instance + part.instance_count]
+        # By Cauchy and Schwarz at least the world area, and just that where a cell is flat or the scale even.
+        area = np.sqrt(np.maximum(np.diff(known.starts) * (rows @ known.moments.T), 0.0))
+        measures.append(area.reshape(-1) * part.density)
+        starts.append(starts[-1] + area.size)
+    measure = np.concatenate(measures)
+    return _Entries(np.cumsum(np.where(np.isfinite(measure), measure, 0.0)), np.array(starts))
+
+
+def _low_discrepancy(count: int, seed: int) -> Array:
+    """(count, 3) in [0, 1): multiples of powers of the root of x⁴ = x + 1, of which any run is as even as a start.
+
+    Roberts 2018, "The unreasonable effectiveness of quasirandom sequences".
+    """
+    root = 1.0
+    for _ in range(64):
+        root = (1.0 + root) ** 0.25
+    step = root ** -np.arange(1.0, 4.0)
+    return np.modf(np.random.default_rng(seed).random(3) + np.arange(count)[:, None] * step)[0]
+
+
+def _choose(entries: _Entries, place: Array) -> tuple[Array, Array, Array]:
+    """Of points at ``place`` (n,) 0..1 in the distribution: entry, how far into it 0..1, and the entry's share."""
+    target = np.minimum(place * entries.total, np.nextafter(entries.total, 0.0))
+    chosen = np.searchsorted(entries.sums, target, "right")
+    before = np.where(chosen > 0, entries.sums[chosen - 1], 0.0)
+    measure = entries.sums[chosen] - before
+    return chosen, (target - before) / measure, measure / entries.total
+
+
+def _gather(parts: Sequence[Part], triangles: Sequence[_Triangles], part: Array, cell: Array, within: Array) -> dict:
+    """What the meshes hold at the corners of each point's triangle."""
+    count = len(part)
+    found = {
+        "positions": np.zeros((count, 3, 3)),
+        "normals": np.zeros((count, 3, 3)),
+        "base_uvs": np.zeros((count, 3, 2)),
+        "emission_uvs": np.zeros((count, 3, 2)),
+        "cell_area": np.zeros(count),
+    }
+    order = np.argsort(part, kind="stable")
+    hit, first = np.unique(part[order], return_index=True)
+    for number, start, end in zip(hit, first, [*first[1:], count], strict=True):
+        mine = order[start:end]
+        known, mesh = triangles[number], parts[number].mesh
+        low, high = known.starts[cell[mine]], known.starts[cell[mine] + 1]
+        # Strictly below the cell's end: what is found there has an area.
+        target = np.minimum(low + within[mine] * (high - low), np.nextafter(high, 0.0))
+        triangle = known.order[np.searchsorted(known.areas, target, "right")] + parts[number].first_triangle
+        found["cell_area"][mine] = high - low
+        layers = {"positions": mesh.positions, "normals": mesh.normals}
+        for name, uv_map in zip(("base_uvs", "emission_uvs"), parts[number].uv_maps, strict=True):
+            if uv_map in mesh.uvs:
+                layers[name] = mesh.uvs[uv_map]
+        for name, layer in layers.items():
+            found[name][mine] = layer.reshape(-1, 3, layer.shape[1])[triangle]
+    return found
+
+
+def _place(corners: dict, numbers: Array, side: Array) -> dict:
+    """Points within their triangles; ``numbers`` (n, 2) in [0, 1)."""
+    root = np.sqrt(numbers[:, 0])
+    shares = np.stack((1.0 - root, root * (1.0 - numbers[:, 1]), root * numbers[:, 1]), -1)
+    points = {
+        name: np.einsum("nc,ncd->nd", shares, corners[name])
+        for name in ("positions", "normals", "base_uvs", "emission_uvs")
+    }
+    a, b, c = corners["positions"].swapaxes(0, 1)
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    points["geometric_normals"] = normal * side[:, None]
+    points["normals"] *= side[:, None]
+    return points
