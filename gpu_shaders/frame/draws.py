@@ -34,11 +34,14 @@ def draw_scene(
     draws: Sequence[Draw],
     each: Callable[[Draw], Mapping[str, Any]] = lambda draw: {},
     viewport: Viewport | None = None,
+    state: DrawState = OPAQUE,
     **shared: Any,
 ) -> None:
-    """Draw with depth test. ``each`` gives what the shader wants to know of a draw beside its instances."""
+    """Draw, with depth test unless ``state`` says otherwise. ``each`` gives what the shader wants to know of a draw
+    beside its instances.
+    """
     shared["instance_tx"] = gpu_scene.instance_table
-    with device.drawing(shader, target, state=OPAQUE, viewport=viewport, **shared) as draw_call:
+    with device.drawing(shader, target, state=state, viewport=viewport, **shared) as draw_call:
         for draw in draws:
             draw_call(
                 draw.vertices,
