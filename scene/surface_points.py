@@ -19,6 +19,8 @@ from .data import Array, Material, Mesh, Scene
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Cells along each side of a face of the cube that directions are sorted by. Odd: the axes lie in the middle of cells.
 _CELLS_A_SIDE = 3
+# At most so many objects are huge: those that have so many times the area of all others.
+_MOST_HUGE, _HUGE = 4, 32.0
 # Pairs (i, j) of the six different elements of a symmetric matrix, and how often each counts in a product of two.
 _PAIRS, _TIMES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)), np.array([1.0, 1, 1, 2, 2, 2])
 
@@ -67,12 +69,8 @@ class Points:
         return len(self.weights)
 
 
-_NO_POINTS = Points(
-    *(np.zeros(0, np.int64) for _ in range(2)),
-    *(np.zeros((0, 3)) for _ in range(3)),
-    *(np.zeros((0, 2)) for _ in range(2)),
-    np.zeros(0),
-)
+_NO_ROWS, _NO_VECTORS, _NO_UVS = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 2))
+_NO_POINTS = Points(_NO_ROWS, _NO_ROWS, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, _NO_UVS, _NO_UVS, weights=np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +105,16 @@ class SurfaceSampler:
     def __init__(self) -> None:
         self._triangles: dict[Hashable, _Triangles] = {}
 
-    def sample(self, parts: Sequence[Part], matrices: Array, count: int, seed: int = 0) -> Points:
-        """``count`` points, or none where nothing has an area. matrices: (n, 4, 4) of all instances."""
+    def sample(
+        self, parts: Sequence[Part], matrices: Array, count: int, seed: int = 0, huge_share: float = 1.0
+    ) -> Points:
+        """``count`` points, or none where nothing has an area. matrices: (n, 4, 4) of all instances.
+
+        Objects that would leave next to nothing to the others (a ground plane) get ``huge_share`` of the points.
+        """
         triangles = self._sorted(parts)
         cofactors = cofactor_matrices(matrices)
-        entries = _list_entries(parts, triangles, cofactors)
+        entries = _list_entries(parts, triangles, cofactors, huge_share)
         if count < 1 or entries.total <= 0.0:
             return _NO_POINTS
         numbers = _low_discrepancy(count, seed)
@@ -195,19 +198,37 @@ def _cells(normal: Array) -> Array:
     return number
 
 
-def _list_entries(parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array) -> _Entries:
+def _list_entries(
+    parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array, huge_share: float
+) -> _Entries:
     # The square of an area vector's stretch is a quadratic form of its direction.
     squares = cofactors.swapaxes(1, 2) @ cofactors
     forms = np.stack([squares[:, i, j] for i, j in _PAIRS], -1) * _TIMES
-    measures, starts = [np.zeros(0)], [0]
+    measures = []
     for part, known in zip(parts, triangles, strict=True):
         rows = forms[part.first_instance : part.first_instance + part.instance_count]
         # By Cauchy and Schwarz at least the world area, and just that where a cell is flat or the scale even.
-        area = np.sqrt(np.maximum(np.diff(known.starts) * (rows @ known.moments.T), 0.0))
-        measures.append(area.reshape(-1) * part.density)
-        starts.append(starts[-1] + area.size)
-    measure = np.concatenate(measures)
-    return _Entries(np.cumsum(np.where(np.isfinite(measure), measure, 0.0)), np.array(starts))
+        area = np.sqrt(np.maximum(np.diff(known.starts) * (rows @ known.moments.T), 0.0)) * part.density
+        measures.append(np.where(np.isfinite(area), area, 0.0))
+    if huge_share < 1.0 and measures:
+        _limit_huge(measures, huge_share)
+    starts = np.cumsum([0, *(measure.size for measure in measures)])
+    return _Entries(np.cumsum(np.concatenate([np.zeros(0), *(measure.ravel() for measure in measures)])), starts)
+
+
+def _limit_huge(measures: Sequence[Array], share: float) -> None:
+    """Make the few that have nearly all of the area ``share`` of it; (rows, cells) a part, changed in place."""
+    totals = np.concatenate([measure.sum(1) for measure in measures])
+    order = np.argsort(-totals, kind="stable")
+    for number in range(1, _MOST_HUGE + 1):
+        huge, rest = totals[order[:number]].sum(), totals[order[number:]].sum()
+        if 0.0 < rest * _HUGE < huge:
+            factors = np.ones(len(totals))
+            factors[order[:number]] = share / (1.0 - share) * rest / huge
+            ends = np.cumsum([len(measure) for measure in measures])
+            for measure, factor in zip(measures, np.split(factors, ends[:-1]), strict=True):
+                measure *= factor[:, None]
+            return
 
 
 def _low_discrepancy(count: int, seed: int) -> Array:

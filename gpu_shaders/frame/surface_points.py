@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 SIDES = 2  # of every surface; a point is on one of them and stands for the other's area too
 # Change of a squared length, as a part of the largest, that the rounding of a rotation may cause.
 SAME_SHAPE = 1e-5
+# Of the points of kind AREA, for objects that have nearly all of the area: a ground to the horizon around a room.
+HUGE_SHARE = 0.5
 
 SURFACE_POINT = Struct(
     "SurfacePoint",
@@ -50,7 +52,7 @@ SURFACE_POINT_DRAW = Shader(
 
 
 class SurfacePoints:
-    """A square of points: of kind AREA spread evenly over all that reflects, of EMISSION by what is emitted.
+    """A square of points on what bounces light: of kind AREA spread evenly, of EMISSION by what is emitted.
 
     Colour textures: world position and area (RGBA32F), unit normal and 1 (AREA) or 2 (EMISSION), flux in watts
     (RGBA32F; AREA: 0), diffuse reflectance (EMISSION: 0). A point is on one side of its surface and its area is of
@@ -105,8 +107,8 @@ class SurfacePoints:
         }
         with self.device.drawing(SURFACE_POINT_DRAW, target, viewport=viewport, **shared) as draw_call:
             for material, first, count in self._runs:
-                textures = gpu_scene.textures_of(material)
-                draw_call(count=3 * count, pc_first_point=first, pc_material=material, **textures)
+                given = {"pc_first_point": first, "pc_material": material, **gpu_scene.textures_of(material)}
+                draw_call(count=3 * count, **given)
 
     def free(self) -> None:
         self.device.free(self._table)
@@ -140,7 +142,8 @@ class SurfacePoints:
         return moved or any(old[m] != gpu_scene.scene.materials[m] for m, _, _ in self._runs)
 
     def _make(self, parts: list[Part], matrices: np.ndarray, count: int, seed: int) -> None:
-        points = self._sampler.sample(parts, matrices, count, seed)
+        huge_share = HUGE_SHARE if self.kind == "AREA" else 1.0
+        points = self._sampler.sample(parts, matrices, count, seed, huge_share)
         self.count = len(points)
         self.total_area = float(points.weights.sum())
         rows = [np.arange(p.first_instance, p.first_instance + p.instance_count) for p in parts]

@@ -140,6 +140,18 @@ def test_density_is_what_gets_points_and_weights_make_it_good():
     np.testing.assert_allclose(np.bincount(points.instances, points.weights), [4, 8], rtol=0.01)
 
 
+@pytest.mark.parametrize("size", [3.0, 5.0, 100.0])
+def test_huge_ground_leaves_points_to_the_rest(size):
+    meshes = [quad("ground", u=(size, 0, 0), v=(0, size, 0)), quad("table")]
+    parts, matrices = parts_of(meshes), np.tile(np.eye(4), (2, 1, 1))
+    points = SurfaceSampler().sample(parts, matrices, 4096, huge_share=0.75)
+    share = size**2 / (1 + size**2) if size**2 < 32 else 0.75
+    np.testing.assert_allclose(np.bincount(points.instances), 4096 * np.array([share, 1 - share]), atol=3)
+    np.testing.assert_allclose(np.bincount(points.instances, points.weights), [4 * size**2, 4], rtol=0.01)
+    alone = SurfaceSampler().sample(parts[:1], matrices, 64, huge_share=0.75)
+    assert alone.weights.sum() == pytest.approx(4 * size**2)
+
+
 def test_points_are_interpolated_from_their_triangle():
     mesh = quad("quad", u=(2, 0, 0), v=(0, 1, 0))
     uvs = {"a": mesh.positions[:, :2] * 0.5 + 3, "b": mesh.positions[:, 1::-1]}
