@@ -5,8 +5,9 @@ from pathlib import Path
 import bpy
 import pytest
 
+from rebound.benchmarks.pictures import diffuse, read_passes
+from rebound.benchmarks.score import energy, relative_squared_error
 from rebound.tests.support.engine_build import render
-from rebound.tests.support.scoring import diffuse, energy, read_passes, relative_squared_error
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
+from rebound.benchmarks.pictures import diffuse, read_passes
 from rebound.scene.convert import convert_scene
 from rebound.tests.support import engine_build
 from rebound.tests.support.blender_build import link, mesh, shader_material
 from rebound.tests.support.light_reference import irradiance
-from rebound.tests.support.scoring import diffuse, read_passes
 
 pytestmark = pytest.mark.slow
 

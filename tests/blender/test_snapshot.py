@@ -25,7 +25,7 @@ def _parameter(path):
     return pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LARGE else [])
 
 
-@pytest.mark.parametrize("file", map(_parameter, FILES))
+@pytest.mark.parametrize("file", [_parameter(path) for path in FILES])
 def test_scene_of_a_file_comes_back_bit_by_bit(clean_scene, tmp_path, file):
     bpy.ops.wm.open_mainfile(filepath=str(file))
     depsgraph = bpy.context.evaluated_depsgraph_get()
