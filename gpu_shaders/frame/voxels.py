@@ -27,7 +27,9 @@ __all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels"]
 
 # Bounded pieces of work: about 10 ms on a weak GPU.
 PIECE_TRIANGLES = 1_000_000
-EVERY_TEXEL = DrawState()
+# Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's software renderer
+# leaves out what was drawn there before, and with it the voxels that it would have marked.
+EVERY_TEXEL = DrawState(blend="ADDITIVE")
 # Voxels around the scene's box: its faces, often walls, lie well inside a voxel, and their rims cover its centre.
 MARGIN = 0.49
 SMALLEST_EDGE = 1e-6  # metres: of a scene that is a point
