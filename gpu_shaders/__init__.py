@@ -6,8 +6,9 @@ from ..device.shader import Shader
 from . import frame
 from .rsm import Rsm
 from .technique import Technique
+from .vpl import Vpl
 
-TECHNIQUES: tuple[type[Technique], ...] = (Rsm,)
+TECHNIQUES: tuple[type[Technique], ...] = (Vpl, Rsm)
 
 
 def all_shaders() -> tuple[Shader, ...]:

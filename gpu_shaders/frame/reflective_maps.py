@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +25,8 @@ _PLACE = {"first_face": 0}
 
 
 class ReflectiveShadowMaps(LightMaps):
-    """Colour textures: position and texel area (RGBA32F), normal (RGBA16F), reflected flux in watts (RGBA32F).
+    """Colour textures: position and texel area (RGBA32F); normal and kind of source (RGBA16F); diffusely reflected flux
+    in watts and the light's number from 1 (RGBA32F); incident flux times specular reflectance, and roughness (RGBA32F).
 
     All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
     """
@@ -33,7 +34,7 @@ class ReflectiveShadowMaps(LightMaps):
     shows_materials = True
 
     def __init__(self, device: Device) -> None:
-        super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F"])
+        super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F", "RGBA32F"])
         self.light_table: Texture | None = None
         self._laid_out: tuple[int, int] | None = None
 
@@ -44,16 +45,21 @@ class ReflectiveShadowMaps(LightMaps):
         self._lay_out_lights(gpu_scene, resolution)
         stale = self.stale(gpu_scene)
         for done, tile in enumerate(stale):
-            self._draw(gpu_scene, tile)
+            if tile.light >= 0:
+                self._draw(gpu_scene, tile)
+            else:
+                self._draw_other(gpu_scene, tile)
             yield (done + 1) / len(stale)
         self._laid_out = (gpu_scene.revision, resolution)
 
     def read(self) -> Iterator[tuple[int, str, dict[str, np.ndarray]]]:
         """Every tile read back: index of its light, name of its face, and the layers of ``renderer.RsmBuffers``."""
         assert self.depth is not None
-        position, normal, flux = (self.device.read(texture)[..., :3] for texture in self.colors)
+        position, normal, flux = (self.device.read(texture)[..., :3] for texture in self.colors[:3])
         depth = self.device.read(self.depth)
         for tile in self.tiles:
+            if tile.light < 0:
+                continue
             x, y, width, height = self.viewport(tile)
             part = np.s_[y : y + height, x : x + width]
             metres = np.where(depth[part] < 1.0, tile.face.metres(depth[part]), np.float32(0.0))
@@ -76,8 +82,15 @@ class ReflectiveShadowMaps(LightMaps):
             look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
             rows.append(row)
             tiles += [MapTile(light.key, index, face, look) for face in faces]
-        self.lay_out(tiles, resolution)
+        self.lay_out((*tiles, *self._other_tiles(gpu_scene)), resolution)
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
+        """Tiles behind the lights' that are no picture from a light; their ``light`` is -1."""
+        return ()
+
+    def _draw_other(self, gpu_scene: GpuScene, tile: MapTile) -> None:
+        raise NotImplementedError
 
     def _draw(self, gpu_scene: GpuScene, tile: MapTile) -> None:
         target, viewport = self.begin(tile, gpu_scene)

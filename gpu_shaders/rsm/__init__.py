@@ -183,7 +183,7 @@ class Rsm:
         offset: tuple[int, int],
     ) -> Iterator[float]:
         """Add the chosen estimator's sum to ``target``, in passes of bounded work."""
-        positions, normals, fluxes = self.maps.colors
+        positions, normals, fluxes = self.maps.colors[:3]
         shared: dict[str, Any] = {
             "position_tx": inputs.gbuffer.position,
             "normal_tx": inputs.gbuffer.normal,
