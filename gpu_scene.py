@@ -119,6 +119,10 @@ class GpuScene:
                 "base_mode": _image_mode(m.base_color_texture),
                 "emission": m.emission,
                 "emission_mode": _image_mode(m.emission_texture),
+                "specular": m.specular,
+                "metallic": m.metallic,
+                "roughness": m.roughness,
+                "layered": m.layered,
             }
             for m in materials
         ]

@@ -86,7 +86,11 @@ class _SceneReader:
             return
         key = self._unique_key(instance, obj, parent)
         if obj.type == "LIGHT":
-            light = read_light(obj, matrix, key, obj.visible_diffuse and parent.visible_diffuse, self.warn)
+            lights = {
+                "diffuse": obj.visible_diffuse and parent.visible_diffuse,
+                "glossy": obj.visible_glossy and parent.visible_glossy,
+            }
+            light = read_light(obj, matrix, key, lights, self.warn)
             if light is not None:
                 self.lights.append(light)
             return

@@ -84,16 +84,22 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """A surface as far as this version shades it: a Lambertian reflector that may emit.
+    """A surface as far as this version shades it: a Lambertian reflector under a GGX lobe, that may emit.
 
+    Diffuse is ``base_color * (1 - metallic)``, less what the layer over it reflects. The lobe's reflectance at normal
+    incidence (F0) goes from ``specular`` to ``base_color`` with ``metallic``; black there means no lobe.
     The place for the full node graph: a material will carry generated GLSL beside these constants.
     """
 
     name: str
-    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # diffuse reflectance, 0..1
+    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # reflectance, 0..1
     base_color_texture: Texture | None = None  # replaces base_color
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)  # radiance, W/(m² sr); strength included
     emission_texture: Texture | None = None  # times emission
+    metallic: float = 0.0  # 0..1
+    specular: tuple[float, float, float] = (0.0, 0.0, 0.0)  # F0 of the dielectric part, 0..1
+    roughness: float = 0.5  # 0..1, the square root of GGX's alpha
+    layered: float = 1.0  # 0..1: how much of ``specular`` lies over the diffuse part and takes its light from it
 
 
 class LightKind(Enum):
@@ -135,6 +141,7 @@ class Light:
     area_spread: float = np.pi  # area: radians
     casts_shadow: bool = True
     diffuse_factor: float = 1.0
+    specular_factor: float = 1.0
 
 
 @dataclass(frozen=True)

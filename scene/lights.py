@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 
 import numpy as np
 
@@ -16,12 +16,14 @@ MAX_POWER = float(np.finfo(np.float32).max)
 ROUND_SHAPES = {AreaShape.DISK, AreaShape.ELLIPSE}
 
 
-def read_light(obj, matrix: Array, key: Hashable, lights_diffuse: bool, warn: Callable[[str], None]) -> Light | None:
+def read_light(
+    obj, matrix: Array, key: Hashable, lights: Mapping[str, bool], warn: Callable[[str], None]
+) -> Light | None:
     """Read an evaluated light object; None for a light that gives no light.
 
     ``matrix`` is the (4, 4) world matrix of this very instance: a light inside a collection has several.
-    ``lights_diffuse`` is the ray visibility of the object and its instancer: Cycles' switch, where ``diffuse_factor``
-    is Blender's slider.
+    ``lights`` is the ray visibility of the object and its instancer, "diffuse" and "glossy": Cycles' switches, where
+    the factors are Blender's sliders.
     """
     light = obj.data
     kind = LightKind(light.type)
@@ -42,7 +44,8 @@ def read_light(obj, matrix: Array, key: Hashable, lights_diffuse: bool, warn: Ca
         power=power,
         world_from_light=matrix,
         casts_shadow=bool(light.use_shadow),
-        diffuse_factor=float(light.diffuse_factor) if lights_diffuse else 0.0,
+        diffuse_factor=float(light.diffuse_factor) if lights["diffuse"] else 0.0,
+        specular_factor=float(light.specular_factor) if lights["glossy"] else 0.0,
         **shape,
     )
 
@@ -102,7 +105,11 @@ def _broken_parameter(light, kind: LightKind) -> str | None:
     """What Blender calls the first setting that nothing can be computed with; a power may be as large as it likes."""
     if not math.isfinite(light.energy):
         return "power"
-    values = {"exposure": light.exposure, "diffuse factor": light.diffuse_factor}
+    values = {
+        "exposure": light.exposure,
+        "diffuse factor": light.diffuse_factor,
+        "specular factor": light.specular_factor,
+    }
     if kind is LightKind.SUN:
         values["angle"] = light.angle
     elif kind is LightKind.AREA:

@@ -1,4 +1,4 @@
-"""Blender material and world -> Material and World: base colour, emission and image textures of the common shaders.
+"""Blender material and world -> Material and World: colour, specular lobe, emission and images of the common shaders.
 
 The full node graph is to be compiled in place of this file; what it must offer is `MaterialTable` and `read_world`.
 """
@@ -30,11 +30,8 @@ GREY: RGB = (0.8, 0.8, 0.8)
 
 # Shaders shown as a diffuse surface of their colour input for now.
 STAND_INS = {
-    "ShaderNodeBsdfAnisotropic": "Color",
-    "ShaderNodeBsdfGlossy": "Color",
     "ShaderNodeBsdfGlass": "Color",
     "ShaderNodeBsdfRefraction": "Color",
-    "ShaderNodeBsdfMetallic": "Base Color",
     "ShaderNodeBsdfSheen": "Color",
     "ShaderNodeBsdfVelvet": "Color",
     "ShaderNodeBsdfToon": "Color",
@@ -42,6 +39,10 @@ STAND_INS = {
     "ShaderNodeSubsurfaceScattering": "Color",
     "ShaderNodeEeveeSpecular": "Base Color",
 }
+GLOSSY = {"ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlossy"}
+# What Schlick's Fresnel term adds to a black F0, averaged over all directions of even light.
+MEAN_FRESNEL = 1.0 / 21.0
+LARGEST_F0 = 0.98  # of a dielectric: IOR 200
 
 
 @dataclass(frozen=True)
@@ -54,10 +55,26 @@ class Paint:
 
 @dataclass(frozen=True)
 class Surface:
-    """What is read of one shader: how it reflects and what it emits."""
+    """What is read of one shader: how it reflects and what it emits. See ``Material``."""
 
     base: Paint = Paint(BLACK)
     emission: Paint = Paint(BLACK)
+    metallic: float = 0.0
+    specular: RGB = BLACK
+    roughness: float = 0.5
+    layered: float = 1.0
+
+    @property
+    def without_metal(self) -> Surface:
+        """The same with its metal among the specular constants; an image cannot be there and stays as it is."""
+        if self.base.texture is not None or self.metallic == 0.0:
+            return self
+        metal = tuple(self.metallic * c for c in self.base.rgb)
+        layer = tuple((1.0 - self.metallic) * c for c in self.specular)
+        specular = tuple(a + b for a, b in zip(metal, layer, strict=True))
+        share = self.layered * mean(layer) / max(mean(specular), 1e-6)
+        base = Paint(tuple((1.0 - self.metallic) * c for c in self.base.rgb))
+        return replace(self, base=base, metallic=0.0, specular=specular, layered=share)
 
 
 @dataclass
@@ -122,6 +139,10 @@ class _Reader:
             base_color_texture=read.base.texture,
             emission=read.emission.rgb,
             emission_texture=read.emission.texture,
+            metallic=read.metallic,
+            specular=read.specular,
+            roughness=read.roughness,
+            layered=read.layered,
         )
 
     def problem(self, text: str) -> None:
@@ -143,6 +164,10 @@ class _Reader:
             return self.principled(found)
         if kind == "ShaderNodeBsdfDiffuse":
             return Surface(base=self.paint(found.input("Color")))
+        if kind in GLOSSY:
+            return self.glossy(found)
+        if kind == "ShaderNodeBsdfMetallic":
+            return self.metal(found)
         if kind == "ShaderNodeEmission":
             return Surface(emission=self.emission(found, "Color", "Strength"))
         if kind == "ShaderNodeMixShader":
@@ -154,7 +179,6 @@ class _Reader:
 
     def principled(self, found: Socket) -> Surface:
         for name, plain, how in (
-            ("Metallic", 0.0, "metallic is shown as diffuse for now"),
             ("Transmission Weight", 0.0, "transmission is shown as diffuse for now"),
             ("Alpha", 1.0, "transparency is shown as opaque for now"),
         ):
@@ -165,7 +189,34 @@ class _Reader:
             if value is None or abs(mean(value) - plain) > 1e-6:  # None: a node makes it
                 self.table.approximated(how, self.name)
         emission = self.emission(found, "Emission Color", "Emission Strength")
-        return Surface(self.paint(found.input("Base Color")), emission)
+        return Surface(
+            self.paint(found.input("Base Color")),
+            emission,
+            metallic=self.level(found, "Metallic"),
+            specular=self.dielectric(found),
+            roughness=self.level(found, "Roughness"),
+        )
+
+    def dielectric(self, found: Socket) -> RGB:
+        """F0 of a Principled BSDF's dielectric part."""
+        ior = max(mean(self.number_of(found, "IOR")), 1e-3)
+        f0 = ((ior - 1.0) / (ior + 1.0)) ** 2 * 2.0 * max(mean(self.number_of(found, "Specular IOR Level")), 0.0)
+        red, green, blue = (min(min(f0, LARGEST_F0) * max(c, 0.0), 1.0) for c in self.number_of(found, "Specular Tint"))
+        return red, green, blue
+
+    def glossy(self, found: Socket) -> Surface:
+        """A Glossy BSDF, which knows no Fresnel term: a metal that reflects as much on average over all directions."""
+        paint = self.paint(found.input("Color"))
+        rgb = tuple(max((c - MEAN_FRESNEL) / (1.0 - MEAN_FRESNEL), 0.0) for c in paint.rgb)
+        return Surface(replace(paint, rgb=rgb), metallic=1.0, roughness=self.level(found, "Roughness"))
+
+    def metal(self, found: Socket) -> Surface:
+        """A Metallic BSDF: its colour, or what its complex IOR reflects at normal incidence."""
+        paint = self.paint(found.input("Base Color"))
+        if found.node.fresnel_type == "PHYSICAL_CONDUCTOR":
+            both = zip(self.number_of(found, "IOR"), self.number_of(found, "Extinction"), strict=True)
+            paint = Paint(tuple(((n - 1.0) ** 2 + k * k) / max((n + 1.0) ** 2 + k * k, 1e-6) for n, k in both))
+        return Surface(paint, metallic=1.0, roughness=self.level(found, "Roughness"))
 
     def emission(self, found: Socket, color: str, strength: str) -> Paint:
         factor = mean(self.number(found.input(strength)))
@@ -186,10 +237,19 @@ class _Reader:
         return self.sum(a, 1.0 - weight, b, weight)
 
     def sum(self, a: Surface, wa: float, b: Surface, wb: float) -> Surface:
+        a, b = a.without_metal, b.without_metal
         base = self.sum_paint(a.base, wa, b.base, wb, multiplies=False)
+        shares = [w * mean(s.specular) for w, s in ((wa, a), (wb, b))]
+        whole = sum(shares)
+        shown = a if base.texture is a.base.texture else b
+        lobe = a if shares[0] >= shares[1] else b
         return Surface(
             replace(base, rgb=tuple(min(c, 1.0) for c in base.rgb)),
             self.sum_paint(a.emission, wa, b.emission, wb, multiplies=True),
+            metallic=shown.metallic,
+            specular=tuple(min(wa * x + wb * y, 1.0) for x, y in zip(a.specular, b.specular, strict=True)),
+            roughness=(shares[0] * a.roughness + shares[1] * b.roughness) / whole if whole else lobe.roughness,
+            layered=(shares[0] * a.layered + shares[1] * b.layered) / whole if whole else 1.0,
         )
 
     def sum_paint(self, a: Paint, wa: float, b: Paint, wb: float, multiplies: bool) -> Paint:
@@ -215,7 +275,26 @@ class _Reader:
         self.problem(f"node '{node.name}' is not read yet, grey is shown")
         return Surface(Paint(GREY))
 
-    # Colours
+    # Colours and numbers
+
+    def number_of(self, found: Socket, name: str) -> RGB:
+        """A constant of a shader's lobe; whatever a node makes of it is one number for now."""
+        socket = found.input(name)
+        value = socket and constant(socket)
+        if socket is None or value is not None:
+            return value or BLACK
+        self.table.approximated(f"{name.lower()} is one number all over for now", self.name)
+        made = source(socket)
+        if made.node.bl_idname == "ShaderNodeTexImage" and made.node.image and made.socket.identifier != "Alpha":
+            key = self.table.images.read(made.node.image, made.node.image_user)
+            if key is not None:
+                red, green, blue = self.table.images.images[key].pixels[..., :3].mean((0, 1), dtype="f8").tolist()
+                return red, green, blue
+        return default_rgb(socket.socket)
+
+    def level(self, found: Socket, name: str) -> float:
+        """The same for a number from 0 to 1."""
+        return min(max(mean(self.number_of(found, name)), 0.0), 1.0)
 
     def number(self, socket: Socket | None) -> RGB:
         if socket is None:

@@ -19,6 +19,10 @@ MATERIAL = Struct(
     base_mode="int",  # -1: no texture; else IMAGE_* bits
     emission="vec3",  # radiance, W/(m² sr)
     emission_mode="int",
+    specular="vec3",  # reflectance at normal incidence of the dielectric part, 0: none
+    metallic="float",  # how much of base_color is specular reflectance, the rest is diffuse
+    roughness="float",
+    layered="float",  # how much of `specular` lies over the diffuse part and takes from it
 )
 
 LIGHT = Struct(
