@@ -8,10 +8,29 @@ const int VOXEL_MOST_STEPS = 8192;
 const float VOXEL_ROUNDING = 0.02;
 /* Voxels: nothing can be told of what lies between points this near. */
 const float VOXEL_NEAREST = 2.0;
+/* Out of another surface's voxels towards who sees the point: so many steps of so many voxels. */
+const int VOXEL_ESCAPES = 4;
+const float VOXEL_ESCAPE = 0.75;
 
-bool voxel_is_set(ivec3 cell, int level)
+/* Bits of a texel that a ray may still meet from a cell on, itself included; forward is 1 or 0 along each axis. */
+uint voxel_ahead(ivec3 cell, ivec3 forward)
 {
-  return (texelFetch(voxel_tx, voxel_texel(cell, level), 0).x >> voxel_bit(cell) & 1u) != 0u;
+  ivec3 at = cell & ivec3(3, 3, 1);
+  uint x = 0x11111111u * (forward.x != 0 ? 15u << at.x & 15u : 15u >> (3 - at.x));
+  uint y = forward.y != 0 ? 0xffffu << (4 * at.y) & 0xffffu : 0xffffu >> (12 - 4 * at.y);
+  uint z = forward.z != 0 ? 0xffffffffu << (16 * at.z) : 0xffffffffu >> (16 - 16 * at.z);
+  return x & (y | y << 16) & z;
+}
+
+/* By how many bits to widen an empty cell: all of its texel where nothing is ahead in it, two cells each way where those
+ * are empty. One texel tells either. */
+ivec3 voxel_widening(uint texel, ivec3 cell, ivec3 forward)
+{
+  if ((texel & voxel_ahead(cell, forward)) == 0u) {
+    return ivec3(2, 2, 1);
+  }
+  bool pairs_empty = (texel >> ((cell.x & 2) | (cell.y & 2) << 2) & 0x00330033u) == 0u;
+  return ivec3(int(pairs_empty));
 }
 
 /* Where a ray along a unit direction first enters an occupied voxel: metres, 0 if it starts in one, negative if it
@@ -22,7 +41,7 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
   /* No component is 0: its inverse times a distance of 0 would be nothing at all. */
   vec3 slope = mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
   vec3 inverse = 1.0 / slope;
-  vec3 one = -start * inverse;
+  vec3 one = (vec3(0.0) - start) * inverse;
   vec3 other = (voxel_grid.size - start) * inverse;
   vec3 enter = min(one, other);
   vec3 leave = max(one, other);
@@ -31,48 +50,58 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
   if (!(t < last)) {
     return -1.0;
   }
-  ivec3 upward = ivec3(greaterThan(slope, vec3(0.0)));
-  ivec3 onward = 2 * upward - 1;
-  ivec3 size = ivec3(voxel_grid.size);
-  ivec3 voxel = clamp(ivec3(floor(start + t * slope)), ivec3(0), size - 1);
-  int level = VOXEL_LEVELS - 1;
-  for (int step = 0; step < VOXEL_MOST_STEPS; step++) {
-    int shift = 2 * level;
-    ivec3 cell = voxel >> shift;
-    if (voxel_is_set(cell, level)) {
+  ivec3 forward = ivec3(greaterThan(slope, vec3(0.0)));
+  ivec3 highest = ivec3(voxel_grid.size) - 1;
+  ivec3 voxel = clamp(ivec3(floor(start + t * slope)), ivec3(0), highest);
+  int level = 0;
+  for (int rounds = 0; rounds < VOXEL_MOST_STEPS; rounds++) {
+    ivec3 cell = voxel >> (2 * level);
+    uint texel = texelFetch(voxel_tx, voxel_texel(cell, level), 0).x;
+    if ((texel >> voxel_bit(cell) & 1u) != 0u) {
       if (level == 0) {
         return t * voxel_grid.edge;
       }
       level--;
       continue;
     }
-    /* Cross the empty cell. The voxel entered is exact along the axis crossed, and stays in the cell's range along the
+    /* Cross the empty cells. The voxel entered is exact along the axis crossed, and stays in their range along the
      * others, so no voxel on the way is left out whatever the rounding of t. */
-    ivec3 low = cell << shift;
-    ivec3 high = low + ((1 << shift) - 1);
-    vec3 ends = (vec3(low + (upward << shift)) - start) * inverse;
+    ivec3 shift = voxel_widening(texel, cell, forward) + 2 * level;
+    ivec3 low = voxel >> shift << shift;
+    ivec3 high = min(low + ((ivec3(1) << shift) - 1), highest);
+    vec3 ends = (vec3(low + (forward << shift)) - start) * inverse;
     t = min(ends.x, min(ends.y, ends.z));
-    if (t >= last) {
+    if (t >= last) { /* the grid's own end as well: it is computed alike */
       return -1.0;
     }
-    ivec3 crossed = ends.x == t ? ivec3(1, 0, 0) : ends.y == t ? ivec3(0, 1, 0) : ivec3(0, 0, 1);
-    ivec3 within = clamp(ivec3(floor(start + t * slope)), low, high);
-    ivec3 beyond = low + upward * (high - low) + onward;
-    voxel = within + crossed * (beyond - within);
-    if (any(lessThan(voxel, ivec3(0))) || any(greaterThanEqual(voxel, size))) {
-      return -1.0;
-    }
-    level += int(level < VOXEL_LEVELS - 1 && voxel >> (shift + 2) != low >> (shift + 2));
+    ivec3 inside = clamp(ivec3(floor(start + t * slope)), low, high);
+    bool by_x = ends.x == t;
+    bool by_y = !by_x && ends.y == t;
+    bool by_z = !by_x && !by_y;
+    voxel.x = by_x ? (forward.x != 0 ? high.x + 1 : low.x - 1) : inside.x;
+    voxel.y = by_y ? (forward.y != 0 ? high.y + 1 : low.y - 1) : inside.y;
+    voxel.z = by_z ? (forward.z != 0 ? high.z + 1 : low.z - 1) : inside.z;
+    bool left_parent = voxel >> (2 * level + 2) != low >> (2 * level + 2);
+    level += int(left_parent && level < VOXEL_LEVELS - 1);
   }
   return -1.0;
+}
+
+/* Whether nothing lies on the way from one point to another. */
+bool voxel_clear(vec3 start, vec3 end)
+{
+  float reach = distance(start, end);
+  return reach <= 0.0 || voxel_trace(start, (end - start) / reach, reach) < 0.0;
 }
 
 /* Whether something is in the voxel that a point lies in; false outside the grid. */
 bool voxel_occupied(vec3 P)
 {
   ivec3 voxel = ivec3(floor((P - voxel_grid.origin) / voxel_grid.edge));
-  bool inside = all(greaterThanEqual(voxel, ivec3(0))) && all(lessThan(voxel, ivec3(voxel_grid.size)));
-  return inside && voxel_is_set(voxel, 0);
+  if (any(lessThan(voxel, ivec3(0))) || any(greaterThanEqual(voxel, ivec3(voxel_grid.size)))) {
+    return false;
+  }
+  return (texelFetch(voxel_tx, voxel_texel(voxel, 0), 0).x >> voxel_bit(voxel) & 1u) != 0u;
 }
 
 /* Metres along its normal to where a plane's own voxels end. An occupied voxel's centre is no more than half an edge
@@ -84,21 +113,30 @@ float voxel_clearance(vec3 unit_normal)
 }
 
 /* Where a ray from a surface may start without meeting the surface's own voxels, on the side that its unit normal
- * points to: 1.0 (along an axis) to 1.2 edges off it. */
+ * points to: 1.0 (along an axis) to 1.2 edges off it. Beside a corner that is in the other surface's voxels. */
 vec3 voxel_start(vec3 P, vec3 geometric_normal)
 {
   return P + voxel_clearance(geometric_normal) * geometric_normal;
+}
+
+/* The same for a point known to be seen from the unit direction `seen_from` (the camera's; the light's, for a point of
+ * its map): beside a corner it moves that way out of the other surface's voxels, which tell nothing of their two sides. */
+vec3 voxel_start_seen(vec3 P, vec3 geometric_normal, vec3 seen_from)
+{
+  vec3 start = voxel_start(P, geometric_normal);
+  for (int steps = 0; steps <= VOXEL_ESCAPES; steps++) {
+    vec3 moved = start + float(steps) * VOXEL_ESCAPE * voxel_grid.edge * seen_from;
+    if (!voxel_occupied(moved)) {
+      return moved;
+    }
+  }
+  return start;
 }
 
 /* Whether nothing lies between two surface points whose unit normals point to the side that is asked about. Points
  * nearer than the grid can tell see each other. */
 bool voxel_visible(vec3 P, vec3 P_geometric, vec3 Q, vec3 Q_geometric)
 {
-  vec3 start = voxel_start(P, P_geometric);
-  vec3 along = voxel_start(Q, Q_geometric) - start;
-  float reach = length(along);
-  if (distance(P, Q) < VOXEL_NEAREST * voxel_grid.edge || reach == 0.0) {
-    return true;
-  }
-  return voxel_trace(start, along / reach, reach) < 0.0;
+  return distance(P, Q) < VOXEL_NEAREST * voxel_grid.edge ||
+         voxel_clear(voxel_start(P, P_geometric), voxel_start(Q, Q_geometric));
 }

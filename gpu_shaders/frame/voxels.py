@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels"]
 
-# Bounded pieces of work: about 10 ms on a weak GPU.
-PIECE_TRIANGLES = 1_000_000
+# Bounded pieces of work: a millisecond of a GPU, a tenth of a second in software.
+PIECE_TRIANGLES = 300_000
+# One more huge object is left out where that makes the box so many times smaller again.
+FURTHER_SHRINK = 2.0
 # Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's software renderer
 # leaves out what was drawn there before, and with it the voxels that it would have marked.
 EVERY_TEXEL = DrawState(blend="ADDITIVE")
@@ -157,12 +160,12 @@ class Voxels:
 def grid_bounds(boxes: np.ndarray) -> np.ndarray:
     """(2, 3) around the boxes (n, 2, 3), without a few huge ones that would take nearly all voxels."""
     order = np.argsort((boxes[:, 1] - boxes[:, 0]).max(1))
-    whole = _around(boxes)
+    bounds, shrink = _around(boxes), math.sqrt(WORTHWHILE_SHRINK)
     for left_out in range(1, min(MOST_HUGE_OBJECTS, len(order) - 1) + 1):
         kept = _around(boxes[order[:-left_out]])
-        if _longest(whole) > math.sqrt(WORTHWHILE_SHRINK) * _longest(kept) > 0.0:
-            return kept
-    return whole
+        if _longest(bounds) > shrink * _longest(kept) > 0.0:
+            bounds, shrink = kept, FURTHER_SHRINK
+    return bounds
 
 
 def _around(boxes: np.ndarray) -> np.ndarray:
@@ -174,13 +177,16 @@ def _longest(bounds: np.ndarray) -> float:
 
 
 def _pieces(draws: Sequence[Draw]) -> Iterator[list[Draw]]:
-    """Runs of draws with about PIECE_TRIANGLES each."""
+    """Runs of draws with about PIECE_TRIANGLES each; large meshes in parts."""
     piece, triangles = [], 0
     for draw in draws:
-        piece.append(draw)
-        triangles += draw.vertex_count // 3 * draw.instance_count
-        if triangles >= PIECE_TRIANGLES:
-            yield piece
-            piece, triangles = [], 0
+        longest = 3 * max(PIECE_TRIANGLES // draw.instance_count, 1)
+        for first in range(0, draw.vertex_count, longest):
+            count = min(longest, draw.vertex_count - first)
+            piece.append(replace(draw, first_vertex=draw.first_vertex + first, vertex_count=count))
+            triangles += count // 3 * draw.instance_count
+            if triangles >= PIECE_TRIANGLES:
+                yield piece
+                piece, triangles = [], 0
     if piece:
         yield piece

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rebound.gpu_scene import GpuScene
-from rebound.gpu_shaders.frame.voxels import Voxels
-from rebound.scene.changes import Changes
+from rebound.gpu_shaders.frame.voxels import grid_bounds
 from rebound.scene.data import Scene, Visibility
 from rebound.tests.support.render_scenes import (
     EVERYTHING,
@@ -20,42 +18,10 @@ from rebound.tests.support.render_scenes import (
     sphere,
     triangles,
 )
-from rebound.tests.support.voxel_reference import ask, coarser, first_hits, unpack
+from rebound.tests.support.voxel_reference import Room, coarser, first_hits
 
 TRACE = "voxel_trace(start, direction, 1e6)"
 FRAME = box("frame", (-1, -1, -1), (1, 1, 1))  # gives the grid its place
-
-
-class Room:
-    """A scene and its voxels on one device."""
-
-    def __init__(self, device, shown: Scene, resolution: int = 64):
-        self.device, self.gpu_scene, self.voxels = device, GpuScene(device), Voxels(device)
-        self._holds: Scene | None = None
-        self.resolution = resolution
-        self.show(shown)
-
-    def show(self, shown: Scene) -> int:
-        """How often the voxels were built for it."""
-        before = self.voxels.built
-        self.gpu_scene.update(shown, Changes.between(self._holds, shown))
-        self._holds = shown
-        for _ in self.voxels.update(self.gpu_scene, self.resolution):
-            pass
-        return self.voxels.built - before
-
-    def level(self, level: int) -> np.ndarray:
-        """(x, y, z) bool."""
-        assert self.voxels.grid is not None and self.voxels._volume is not None
-        return unpack(self.device.read(self.voxels._volume), self.voxels.grid, level)
-
-    def ask(self, expression: str, **inputs) -> np.ndarray:
-        return ask(self.device, self.voxels, expression, **inputs)
-
-    def free(self) -> None:
-        self.voxels.free()
-        self.gpu_scene.free()
-        assert self.device.error == "GL_NO_ERROR"
 
 
 @pytest.fixture
@@ -70,6 +36,7 @@ def room(headless_device):
     yield make
     for one in made:
         one.free()
+    assert headless_device.error == "GL_NO_ERROR"
 
 
 def unit(vectors):
@@ -141,6 +108,18 @@ def test_a_huge_ground_does_not_take_the_voxels(room):
     assert shown.voxels.edge == pytest.approx(2 / 63.02)
     down = shown.ask(TRACE, start=np.array([(0.0, 0.0, 0.5), (40.0, 0.0, 0.5)]), direction=np.array([(0, 0, -1.0)] * 2))
     assert down[0] == pytest.approx(1.5, abs=shown.voxels.edge) and down[1] == -1
+
+
+def test_huge_objects_are_left_out_of_the_box_only_where_that_gains_much():
+    def boxes(*sizes):
+        return np.array([[(-size,) * 3, (size,) * 3] for size in sizes], np.float64)
+
+    assert grid_bounds(boxes(1, 1, 1, 5.9))[1, 0] == 5.9
+    assert grid_bounds(boxes(1, 1, 1, 6.1))[1, 0] == 1
+    assert grid_bounds(boxes(1, 1, 5, 100))[1, 0] == 1  # one step makes the next worthwhile
+    assert grid_bounds(boxes(1, 1, 1.9, 100))[1, 0] == 1.9
+    assert grid_bounds(boxes(1, 20, 20, 20, 20, 20))[1, 0] == 20
+    assert grid_bounds(boxes(0))[1, 0] == 0
 
 
 # --- rays ------------------------------------------------------------------------------------------------------------
@@ -239,7 +218,7 @@ def test_no_ray_passes_a_wall_however_it_stands(room, pieces):
 
 def test_no_ray_leaves_a_closed_ball(room):
     rng = np.random.default_rng(4)
-    for rings, resolution in ((8, 64), (200, 64), (40, 256)):
+    for rings, resolution in ((8, 64), (150, 64), (40, 256)):
         shown = room(scene([sphere("ball", (0.1, 0.2, 0.3), 1.0, rings=rings)]), resolution=resolution)
         start = np.array([0.1, 0.2, 0.3]) + 0.5 * unit(rng.normal(size=(20000, 3)))
         found = shown.ask(TRACE, start=start, direction=unit(rng.normal(size=(20000, 3))))
@@ -281,6 +260,22 @@ def test_points_see_each_other_unless_a_wall_is_between(room):
     found = walled.ask(seen, P=P, Q=Q)
     np.testing.assert_array_equal(found[clear], ~between[clear])
     assert between[clear].any() and not between[clear].all()
+
+
+def test_point_beside_a_wall_sees_its_own_side_only(room):
+    """On a floor that goes on below the wall, nearer to the wall than its voxels reach."""
+    rng = np.random.default_rng(8)
+    shown = room(scene([quad("floor"), quad("wall", (0.0123, 0, 0.5), (0, 1, 0), (0, 0, 0.5))]), resolution=128)
+    edge, count = shown.voxels.edge, 2000
+    side = rng.choice([-1, 1], (count, 1))
+    x = 0.0123 + side * edge * rng.uniform(0.02, 1.0, (count, 1))
+    P = np.concatenate([x, rng.uniform(-0.5, 0.5, (count, 1)), np.zeros((count, 1))], 1)
+    end = np.concatenate([rng.choice([-1, 1], (count, 1)) * 0.6, rng.uniform(-0.5, 0.5, (count, 1)), 0 * x + 0.7], 1)
+    eye = unit(np.concatenate([0.5 * side, rng.uniform(-0.5, 0.5, (count, 1)), 0 * x + 1.0], 1))
+    up = "vec3(0.0, 0.0, 1.0)"
+    found = shown.ask(f"voxel_clear(voxel_start_seen(P, {up}, eye), end)", P=P, eye=eye, end=end)
+    np.testing.assert_array_equal(found, (np.sign(end[:, :1]) == side)[:, 0])
+    assert shown.ask(f"voxel_occupied(voxel_start(P, {up}))", P=P).mean() > 0.3
 
 
 # --- work ------------------------------------------------------------------------------------------------------------

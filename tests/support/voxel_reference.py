@@ -1,13 +1,47 @@
-"""What the grid of voxels must hold and what a ray through it must meet, in numpy."""
+"""A scene with its voxels on any device; what they must hold and what a ray must meet, in numpy."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rebound.device import Shader
-from rebound.gpu_shaders.frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS, VoxelGrid
+from rebound.gpu_scene import GpuScene
+from rebound.gpu_shaders.frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS, VoxelGrid, Voxels
+from rebound.scene.changes import Changes
+from rebound.scene.data import Scene
 
 WIDTH = 64
+
+
+class Room:
+    """A scene and its voxels on one device."""
+
+    def __init__(self, device, shown: Scene, resolution: int = 64):
+        self.device, self.gpu_scene, self.voxels = device, GpuScene(device), Voxels(device)
+        self._holds: Scene | None = None
+        self.resolution = resolution
+        self.show(shown)
+
+    def show(self, shown: Scene) -> int:
+        """How often the voxels were built for it."""
+        before = self.voxels.built
+        self.gpu_scene.update(shown, Changes.between(self._holds, shown))
+        self._holds = shown
+        for _ in self.voxels.update(self.gpu_scene, self.resolution):
+            pass
+        return self.voxels.built - before
+
+    def level(self, level: int) -> np.ndarray:
+        """(x, y, z) bool."""
+        assert self.voxels.grid is not None and self.voxels._volume is not None
+        return unpack(self.device.read(self.voxels._volume), self.voxels.grid, level)
+
+    def ask(self, expression: str, **inputs) -> np.ndarray:
+        return ask(self.device, self.voxels, expression, **inputs)
+
+    def free(self) -> None:
+        self.voxels.free()
+        self.gpu_scene.free()
 
 
 def unpack(volume: np.ndarray, grid: VoxelGrid, level: int = 0) -> np.ndarray:
@@ -18,20 +52,6 @@ def unpack(volume: np.ndarray, grid: VoxelGrid, level: int = 0) -> np.ndarray:
     bits = words[..., None] >> np.arange(32, dtype=np.uint32) & 1
     cells = bits.reshape(bz, by, bx, 2, 2, 4, 4).transpose(0, 3, 4, 1, 5, 2, 6).reshape(4 * bz, 4 * by, 4 * bx)
     return cells.transpose(2, 1, 0).astype(bool)
-
-
-def pack(cells: list[np.ndarray], grid: VoxelGrid) -> np.ndarray:
-    """The inverse of ``unpack``: all levels in one volume, (d, h, w, 1) uint32."""
-    width, height, depth = grid.volume_size
-    volume = np.zeros((depth, height, width, 1), np.uint32)
-    first = 0
-    for level, bricks in enumerate(grid.bricks):
-        bx, by, bz = (int(n) for n in bricks)
-        bits = cells[level].transpose(2, 1, 0).reshape(bz, 2, 2, by, 4, bx, 4).transpose(0, 3, 5, 1, 2, 4, 6)
-        words = (bits.reshape(bz, by, bx, 2, 32).astype(np.uint64) << np.arange(32, dtype=np.uint64)).sum(-1)
-        volume[first : first + bz, :by, : 2 * bx, 0] = words.reshape(bz, by, 2 * bx)
-        first += bz
-    return volume
 
 
 def coarser(cells: np.ndarray, bricks: np.ndarray) -> np.ndarray:

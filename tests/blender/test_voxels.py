@@ -1,0 +1,38 @@
+"""Voxels on Blender's device, on the backend that the run asked for: atomics of a draw, and the rays that read them."""
+
+import numpy as np
+
+from rebound.device.blender import BlenderDevice
+from rebound.tests.support.render_scenes import box, place, quad, scene, sphere
+from rebound.tests.support.voxel_reference import Room, coarser, first_hits
+
+FRAME = box("frame", (-1, -1, -1), (1, 1, 1))
+
+
+def test_rays_meet_what_was_drawn(gpu_backend):
+    device = BlenderDevice()
+    room = Room(device, scene([FRAME, sphere("ball", radius=0.5)]), 72)
+    grid, voxels = room.voxels.grid, room.level(0)
+    for level in (1, 2):
+        np.testing.assert_array_equal(room.level(level), coarser(room.level(level - 1), grid.bricks[level]))
+    rng = np.random.default_rng(1)
+    start = rng.uniform(-0.9, 0.9, (300, 3)).astype(np.float32).astype(np.float64)
+    direction = rng.normal(size=(300, 3))
+    direction = (direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    found = room.ask("voxel_trace(start, direction, 1e6)", start=start, direction=direction)
+    expected = first_hits(voxels, grid, start, direction, 1e6)
+    assert np.isfinite(expected).all() and 0 < (expected == 0).mean() < 0.1
+    assert (~np.isclose(found, expected, atol=1e-3 * grid.edge)).sum() <= 1
+    room.free()
+    device.close()
+
+
+def test_moved_object_leaves_no_voxel_behind(gpu_backend):
+    device = BlenderDevice()
+    corners = [FRAME, quad("wall", u=(0, 0.5, 0), v=(0, 0, 0.5))]
+    room = Room(device, scene(corners))
+    assert room.level(0)[30:33, 30:33, 30:33].any()
+    assert room.show(scene(corners, matrices={"wall": place((0.5, 0, 0))})) == 1
+    assert not room.level(0)[30:33, 30:33, 30:33].any()
+    room.free()
+    device.close()
