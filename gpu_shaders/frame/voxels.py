@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...device.interface import Device, DrawState, Target, Texture
+from ...device.interface import Device, Target, Texture
 from ...scene.data import Visibility
-from .draws import draw_scene, visible_draws
+from .draws import ADD, draw_scene, visible_draws
 from .maps import MOST_HUGE_OBJECTS, WORTHWHILE_SHRINK
 from .voxel_shaders import VOXEL_DRAW, VOXEL_GRID, VOXEL_SAMPLERS
 
@@ -30,9 +31,6 @@ __all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels"]
 PIECE_TRIANGLES = 300_000
 # One more huge object is left out where that makes the box so many times smaller again.
 FURTHER_SHRINK = 2.0
-# Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's software renderer
-# leaves out what was drawn there before, and with it the voxels that it would have marked.
-EVERY_TEXEL = DrawState(blend="ADDITIVE")
 # Voxels around the scene's box: its faces, often walls, lie well inside a voxel, and their rims cover its centre.
 MARGIN = 0.49
 SMALLEST_EDGE = 1e-6  # metres: of a scene that is a point
@@ -54,7 +52,7 @@ class VoxelGrid:
         x, y, _ = self.bricks[0]
         return 2 * int(x), int(y), int(sum(bricks[2] for bricks in self.bricks))
 
-    @property
+    @cached_property
     def block(self) -> np.ndarray:
         """The uniform block VOXEL_GRID."""
         first = int(self.bricks[0][2])
@@ -149,7 +147,9 @@ class Voxels:
             self._canvas,
             draws,
             viewport=self.grid.viewport(axis),
-            state=EVERY_TEXEL,
+            # Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's
+            # software renderer leaves out what was drawn there before, and what it would have marked.
+            state=ADD,
             voxel_img=self._volume,
             voxel_grid=self.grid.block,
             pc_clip_from_world=self.grid.clip_from_world(axis),

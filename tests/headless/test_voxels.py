@@ -73,6 +73,17 @@ def test_coarse_levels_say_where_fine_ones_have_anything(room):
     assert 0 < dust.level(0).sum() < 3000
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_surfaces_behind_one_another_are_all_kept(room, order):
+    """Each fills many of a software rasterizer's tiles, which forgets what an opaque surface covers."""
+    walls = [quad(f"wall {axis} {at}", at * n, u, v) for axis in range(3) for at in (-1, -0.4, 0.2, 1)
+             for n, u, v in [np.roll(np.eye(3), -axis, 0)]]  # fmt: skip
+    cells = room(scene(walls[::order]), resolution=256).level(0)
+    for axis in range(3):
+        layers = cells.all(tuple({0, 1, 2} - {axis}))
+        assert layers[[0, 255]].all() and layers.sum() == 4
+
+
 @pytest.mark.parametrize("resolution", [64, 128, 320, 512])
 def test_voxels_lie_on_the_surface_and_fill_it(room, resolution):
     ball = room(scene([sphere("ball", (5, 0, 0), 2.0, rings=64)]), resolution=resolution)
