@@ -11,17 +11,19 @@ FRAME = box("frame", (-1, -1, -1), (1, 1, 1))
 
 def test_rays_meet_what_was_drawn(gpu_backend):
     device = BlenderDevice()
-    room = Room(device, scene([FRAME, sphere("ball", radius=0.5)]), 72)
+    room = Room(device, scene([FRAME, sphere("ball", radius=0.5)]), 136)
     grid, voxels = room.voxels.grid, room.level(0)
+    for axis in range(3):  # more than one tile of a software rasterizer: none may be lost
+        assert voxels.take([0, 135], axis).sum() == 2 * 136 * 136
     for level in (1, 2):
         np.testing.assert_array_equal(room.level(level), coarser(room.level(level - 1), grid.bricks[level]))
     rng = np.random.default_rng(1)
-    start = rng.uniform(-0.9, 0.9, (300, 3)).astype(np.float32).astype(np.float64)
-    direction = rng.normal(size=(300, 3))
+    start = rng.uniform(-0.9, 0.9, (100, 3)).astype(np.float32).astype(np.float64)
+    direction = rng.normal(size=(100, 3))
     direction = (direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
     found = room.ask("voxel_trace(start, direction, 1e6)", start=start, direction=direction)
     expected = first_hits(voxels, grid, start, direction, 1e6)
-    assert np.isfinite(expected).all() and 0 < (expected == 0).mean() < 0.1
+    assert np.isfinite(expected).all() and (expected == 0).mean() < 0.1
     assert (~np.isclose(found, expected, atol=1e-3 * grid.edge)).sum() <= 1
     room.free()
     device.close()
