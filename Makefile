@@ -7,15 +7,20 @@
 #   make format     rewrite Python and GLSL the way lint wants them
 #   make package    dist/rebound-<version>.zip, to install in Blender
 #   make setup      only make the virtual environment
+#   make bench      measure Rebound beside EEVEE and Cycles, into docs/performance.md (hours on software OpenGL;
+#                   make bench BENCH="--quick --scenes cornell_box" for minutes)
+#   make report     out/bench/report.html: the same pictures and figures, with a divider to drag
+#   make bench-gpu  time every pass on this machine's GPU, without Blender (BENCH="SNAPSHOT.npz ...")
 #   make clean      remove everything made here, virtual environments included
 
 # Set-up needs a Python 3.11 or newer that runs (a pyenv shim on PATH may not).
 PYTHON ?= $(shell for python in python3 python3.13 python3.11 /usr/bin/python3 $(HOME)/.pyenv/versions/3.1[13]*/bin/python3; do \
 	"$$python" -c "import tomllib" 2>/dev/null && echo "$$python" && break; done)
 BLENDER ?=
+BENCH ?=
 VENV := $(if $(BLENDER),.venv-$(BLENDER),.venv)
 
-.PHONY: render test test-all lint format package setup setup-render clean
+.PHONY: render test test-all lint format package setup setup-render bench report bench-gpu clean
 
 render: setup-render
 	@$(VENV)/bin/python tools/render_example.py
@@ -34,6 +39,16 @@ format: setup
 
 package: setup-render
 	@$(VENV)/bin/python tools/package.py
+
+bench: setup
+	@$(VENV)/bin/python benchmarks/bench.py $(BENCH)
+
+report: setup
+	@$(VENV)/bin/python benchmarks/bench.py --steps report $(BENCH)
+
+# With any Python that has numpy and moderngl, where there is no virtual environment.
+bench-gpu:
+	@$(if $(wildcard $(VENV)/bin/python),$(VENV)/bin/python,$(PYTHON)) benchmarks/bench_gpu.py $(BENCH)
 
 setup: python
 	@$(PYTHON) tools/setup.py --for-tests --blender "$(BLENDER)"

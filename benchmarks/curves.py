@@ -15,13 +15,12 @@ from rebound.settings import Settings
 from .cases import BOUNCES, OWN_REFERENCE, OWN_REFERENCE_QUICK, Case, Goal
 from .jobs import Done, Job, do
 from .pictures import Passes, diffuse, quantity, read_passes, save_picture
-from .results import CYCLES, EEVEE, REBOUND, Curve, Pass, Point, SceneResult
+from .results import CYCLES, EEVEE, F12, REBOUND, Curve, Pass, Point, SceneResult
 from .score import scores
 from .studio import Method, Studio, methods, seconds
 from .timed_device import TimedDevice, median_passes
 
 Say = Callable[[str], None]
-F12 = ", F12 in Blender"  # what distinguishes Blender's own call of a method from the renderer alone
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 T = TypeVar("T")
 
 REBOUND, EEVEE, CYCLES = "Rebound", "EEVEE", "Cycles"
+F12 = ", F12 in Blender"  # ends the label of a method as Blender calls it; without it, the renderer alone
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,11 @@ BLENDER_FILES = {
 }
 TEST_LIBRARIES = {"libvulkan.so.1": "libvulkan1"}
 TEST_FILES = {("/usr/share/vulkan/icd.d/*.json", "/etc/vulkan/icd.d/*.json"): "mesa-vulkan-drivers"}
-TEST_PROGRAMS = {"glslangValidator": "glslang-tools"}
+# Programs of which any one will do -> Debian package.
+TEST_PROGRAMS = {
+    ("glslangValidator",): "glslang-tools",
+    ("chromium-headless-shell", "chromium", "google-chrome"): "chromium-headless-shell",
+}
 
 
 def _loads(library: str) -> bool:
@@ -53,7 +57,7 @@ def missing_packages(for_tests: bool) -> list[str]:
     programs = TEST_PROGRAMS if for_tests else {}
     packages = [package for library, package in libraries.items() if not _loads(library)]
     packages += [package for patterns, package in files.items() if not any(map(glob.glob, patterns))]
-    packages += [package for program, package in programs.items() if not shutil.which(program)]
+    packages += [package for names, package in programs.items() if not any(map(shutil.which, names))]
     return list(dict.fromkeys(packages))
 
 
