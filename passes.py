@@ -15,7 +15,7 @@ class RenderPass:
     """``channels`` are Blender's: RGBA, RGB, XYZ or Z. ``read`` gives (h, w, len(channels)) float32.
 
     ``label`` is the pass's name in Blender too, but before 5.0, where that was ``old_name``. ``view_layer_property`` is
-    the one of bpy.types.ViewLayer that asks for it.
+    the one of bpy.types.ViewLayer that asks for it. ``needs`` names the pictures that ``read`` takes the mean of.
     """
 
     key: str
@@ -23,6 +23,7 @@ class RenderPass:
     old_name: str
     view_layer_property: str
     channels: str
+    needs: tuple[str, ...]
     read: Callable[[Mean], np.ndarray]
 
 
@@ -34,27 +35,40 @@ def _depth(mean: Mean) -> np.ndarray:
     return np.ascontiguousarray(mean("position_depth")[..., 3:])
 
 
-def _per_color(name: str) -> Callable[[Mean], np.ndarray]:
+def _per_color(name: str, color_name: str) -> Callable[[Mean], np.ndarray]:
     """Light without its surface's colour: the mean of light times colour over the mean colour, 0 where that is 0."""
 
     def read(mean: Mean) -> np.ndarray:
-        color = mean("diffuse_color")[..., :3]
+        color = mean(color_name)[..., :3]
         return np.divide(mean(name)[..., :3], color, out=np.zeros_like(color), where=color > 0)
 
     return read
 
 
+def _plain(key: str, label: str, old_name: str, view_layer_property: str, channels: str) -> RenderPass:
+    """A pass that is one picture as it is."""
+    return RenderPass(key, label, old_name, view_layer_property, channels, (key,), _first(key, len(channels)))
+
+
+def _lit(kind: str, old_kind: str, light: str) -> RenderPass:
+    """Direct or indirect light of one kind of reflection."""
+    key, color, label = f"{kind}_{light}", f"{kind}_color", f"{kind.title()} {light.title()}"
+    old_name, needs = old_kind + light.title()[:3], (key, color)
+    return RenderPass(key, label, old_name, f"use_pass_{key}", "RGB", needs, _per_color(key, color))
+
+
 PASSES = (
-    RenderPass("combined", "Combined", "Combined", "use_pass_combined", "RGBA", _first("combined", 4)),
-    RenderPass("depth", "Depth", "Depth", "use_pass_z", "Z", _depth),
-    RenderPass("normal", "Normal", "Normal", "use_pass_normal", "XYZ", _first("normal", 3)),
-    RenderPass("position", "Position", "Position", "use_pass_position", "XYZ", _first("position_depth", 3)),
-    RenderPass("diffuse_direct", "Diffuse Direct", "DiffDir", "use_pass_diffuse_direct", "RGB",
-               _per_color("diffuse_direct")),
-    RenderPass("diffuse_indirect", "Diffuse Indirect", "DiffInd", "use_pass_diffuse_indirect", "RGB",
-               _per_color("diffuse_indirect")),
-    RenderPass("diffuse_color", "Diffuse Color", "DiffCol", "use_pass_diffuse_color", "RGB",
-               _first("diffuse_color", 3)),
-    RenderPass("emission", "Emission", "Emit", "use_pass_emit", "RGB", _first("emission", 3)),
-    RenderPass("environment", "Environment", "Env", "use_pass_environment", "RGB", _first("environment", 3)),
+    _plain("combined", "Combined", "Combined", "use_pass_combined", "RGBA"),
+    RenderPass("depth", "Depth", "Depth", "use_pass_z", "Z", ("position_depth",), _depth),
+    _plain("normal", "Normal", "Normal", "use_pass_normal", "XYZ"),
+    RenderPass("position", "Position", "Position", "use_pass_position", "XYZ", ("position_depth",),
+               _first("position_depth", 3)),
+    _lit("diffuse", "Diff", "direct"),
+    _lit("diffuse", "Diff", "indirect"),
+    _plain("diffuse_color", "Diffuse Color", "DiffCol", "use_pass_diffuse_color", "RGB"),
+    _lit("glossy", "Gloss", "direct"),
+    _lit("glossy", "Gloss", "indirect"),
+    _plain("glossy_color", "Glossy Color", "GlossCol", "use_pass_glossy_color", "RGB"),
+    _plain("emission", "Emission", "Emit", "use_pass_emit", "RGB"),
+    _plain("environment", "Environment", "Env", "use_pass_environment", "RGB"),
 )  # fmt: skip

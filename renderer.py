@@ -6,20 +6,20 @@ can show progress, keep an interface alive, and cancel between two pieces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .device.interface import Device, Target, Texture
+from .device.interface import Device, DrawState, Target, Texture
 from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.direct import DirectLight
 from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
 from .gpu_shaders.frame.inputs import FrameInputs, GBuffer, LightTargets
 from .gpu_shaders.frame.pixel_filter import pixel_offset
-from .gpu_shaders.frame.shaders import ACCUMULATE, GBUFFER, GEOMETRY, RESOLVE
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
+from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, SUMS, accumulate
 from .gpu_shaders.technique import Technique
 from .passes import PASSES
 from .scene.data import View, Visibility
@@ -28,7 +28,11 @@ from .settings import Settings
 # How far a sample is after each step, for the progress bar: about their shares of the time.
 GBUFFER_DONE, DIRECT_DONE, INDIRECT_DONE = 0.1, 0.4, 0.95
 
-SUMS = tuple(ACCUMULATE.outputs)  # the accumulated textures, in slot order
+ALL_PASSES = tuple(p.key for p in PASSES)
+WAYS = ("direct", "indirect")
+LIGHTS = tuple(field.name for field in fields(LightTargets))
+# Sums in one accumulation: as many as a GPU draws into at once.
+SUMS_A_PASS = 6
 
 
 class RenderError(RuntimeError):
@@ -43,27 +47,30 @@ class Frame:
     height: int
     gbuffer: GBuffer
     gbuffer_target: Target
+    background_target: Target  # what of the G-buffer means something where there is no surface
     light: LightTargets
     direct_target: Target  # both direct ones of ``light``
     indirect_target: Target  # both indirect ones
-    sums: Mapping[str, Texture]  # by the names of ACCUMULATE's outputs
-    sum_target: Target
-    geometry: tuple[Texture, Texture]  # position and depth, normal: of the first sample
-    geometry_target: Target
+    sums: Mapping[str, Texture]  # those of SUMS that its passes need
+    sum_targets: Mapping[tuple[str, ...], Target]  # by the sums in their slots
+    geometry: tuple[Texture, ...]  # position and depth, normal: of the first sample; none where no pass needs them
+    geometry_target: Target | None
     resolved: Texture
     resolved_target: Target
     samples: int = 0
+    is_glossy: bool = False  # whether there may be something in the glossy targets
 
     @property
     def resources(self) -> tuple[Texture | Target, ...]:
         """Everything to free: framebuffers before their textures."""
         targets = (
             self.gbuffer_target,
+            self.background_target,
             *self._lights,
             self.direct_target,
             self.indirect_target,
-            self.sum_target,
-            self.geometry_target,
+            *self.sum_targets.values(),
+            *((self.geometry_target,) if self.geometry_target else ()),
             self.resolved_target,
         )
         textures = (
@@ -78,8 +85,7 @@ class Frame:
 
     @property
     def _lights(self) -> tuple[Target, ...]:
-        light = self.light
-        return light.diffuse_direct, light.diffuse_indirect, light.glossy_direct, light.glossy_indirect
+        return tuple(getattr(self.light, name) for name in LIGHTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,20 +110,22 @@ class Renderer:
         self._techniques: dict[str, Technique] = {}
         self._triangles = 0
 
-    def begin(self, view: View) -> Frame:
-        """An empty frame of the view's size. Raises RenderError where the GPU has no texture of that size."""
+    def begin(self, view: View, passes: Sequence[str] = ALL_PASSES) -> Frame:
+        """An empty frame of the view's size, of which these passes can be read.
+
+        Raises RenderError where the GPU has no texture of that size.
+        """
         size = (view.width, view.height)
         largest = self.device.max_texture_size
         if max(size) > largest or min(size) < 1:
             raise RenderError(
                 f"A picture of {size[0]} x {size[1]} pixels is not possible: this GPU takes 1 to {largest} a side"
             )
-        return _new_frame(self.device, *size)
+        return _new_frame(self.device, *size, passes)
 
     def restart(self, frame: Frame) -> None:
         """Empty a frame for another picture of its size: much quicker than to begin one."""
-        self.device.clear(frame.sum_target)
-        frame.samples = 0
+        frame.samples = 0  # the next sample covers the sums
 
     def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
         """Add one anti-aliased sample to ``frame``; yields progress 0..1 after every bounded piece of GPU work.
@@ -128,23 +136,20 @@ class Renderer:
         self._triangles = gpu_scene.triangle_count
         self._draw_gbuffer(frame, inputs)
         yield GBUFFER_DONE
-        self.device.clear(frame.direct_target)
-        filtered = settings["soft_shadows"] == "FILTERED"
-        resolution = int(settings["shadow_resolution"])
-        for done in self._direct.draw(inputs, frame.light.diffuse_direct, filtered=filtered, resolution=resolution):
+        for done in self._draw_direct(frame, inputs, settings):
             yield GBUFFER_DONE + (DIRECT_DONE - GBUFFER_DONE) * done
-        self.device.clear(frame.indirect_target)
         technique = self._technique(settings)
         if technique is not None:
+            self.device.clear(frame.indirect_target if frame.is_glossy else frame.light.diffuse_indirect)
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
-        self._accumulate(frame, inputs)
+        self._accumulate(frame, inputs, indirect=technique is not None)
         yield 1.0
 
     def texture(self, frame: Frame) -> Texture:
         """RGBA32F mean of the combined pass so far, for the screen; valid until the next call."""
-        weight = 1.0 / max(frame.samples, 1)
-        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums["out_combined"], pc_weight=weight)
+        weight = 1.0 / frame.samples if frame.samples else 0.0
+        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums["combined"], pc_weight=weight)
         return frame.resolved
 
     def read(self, frame: Frame, key: str) -> np.ndarray:
@@ -157,7 +162,7 @@ class Renderer:
             return self.device.read(frame.geometry[0])
         if name == "normal":
             return self.device.read(frame.geometry[1])
-        return self.device.read(frame.sums[f"out_{name}"]) / np.float32(max(frame.samples, 1))
+        return self.device.read(frame.sums[name]) / np.float32(max(frame.samples, 1))
 
     def rsm_buffers(self, gpu_scene: GpuScene, settings: Settings) -> list[RsmBuffers]:
         """Every light's reflective shadow map, drawn for this scene."""
@@ -203,8 +208,23 @@ class Renderer:
                 self._techniques[wanted] = kind(self.device)
         return self._techniques.get(wanted)
 
+    def _draw_direct(self, frame: Frame, inputs: FrameInputs, settings: Settings) -> Iterator[float]:
+        """Direct light into its targets; a scene without a specular lobe leaves the glossy ones zero."""
+        glossy = inputs.gpu_scene.is_glossy
+        if frame.is_glossy and not glossy:
+            self.device.clear(frame.direct_target)
+            self.device.clear(frame.indirect_target)
+        frame.is_glossy = glossy
+        yield from self._direct.draw(
+            inputs,
+            frame.direct_target if glossy else frame.light.diffuse_direct,
+            glossy=glossy,
+            filtered=settings["soft_shadows"] == "FILTERED",
+            resolution=int(settings["shadow_resolution"]),
+        )
+
     def _draw_gbuffer(self, frame: Frame, inputs: FrameInputs) -> None:
-        self.device.clear(frame.gbuffer_target)
+        self.device.clear(frame.background_target)
 
         def each(draw: Draw) -> dict:
             holdout = int(bool(draw.visibility & Visibility.HOLDOUT))
@@ -222,22 +242,19 @@ class Renderer:
             pc_eye=inputs.eye,
         )
 
-    def _accumulate(self, frame: Frame, inputs: FrameInputs) -> None:
+    def _accumulate(self, frame: Frame, inputs: FrameInputs, *, indirect: bool) -> None:
         gbuffer, scene = frame.gbuffer, inputs.gpu_scene.scene
-        background = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
-        self.device.fullscreen(
-            ACCUMULATE,
-            frame.sum_target,
-            state=ADD,
-            albedo_tx=gbuffer.albedo,
-            emission_tx=gbuffer.emission,
-            diffuse_direct_tx=frame.light.diffuse_direct.colors[0],
-            diffuse_indirect_tx=frame.light.diffuse_indirect.colors[0],
-            glossy_direct_tx=frame.light.glossy_direct.colors[0],
-            glossy_indirect_tx=frame.light.glossy_indirect.colors[0],
-            pc_background=background,
-        )
-        if frame.samples == 0:
+        light = {name: getattr(frame.light, name).colors[0] for name in LIGHTS}
+        pictures = {**light, **{name: getattr(gbuffer, name) for name in ("albedo", "emission", "position", "normal")}}
+        given = {f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))}
+        given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
+        given["pc_eye"] = inputs.eye
+        state = ADD if frame.samples else DrawState()
+        for sums, target in frame.sum_targets.items():
+            shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect)
+            wanted = (*shader.samplers, *shader.constants)
+            self.device.fullscreen(shader, target, state=state, **{name: given[name] for name in wanted})
+        if frame.samples == 0 and frame.geometry_target is not None:
             self.device.fullscreen(
                 GEOMETRY,
                 frame.geometry_target,
@@ -259,7 +276,7 @@ def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameIn
     return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world)
 
 
-def _new_frame(device: Device, width: int, height: int) -> Frame:
+def _new_frame(device: Device, width: int, height: int, passes: Sequence[str]) -> Frame:
     def texture(name: str) -> Texture:
         return device.texture((width, height), name)
 
@@ -271,28 +288,27 @@ def _new_frame(device: Device, width: int, height: int) -> Frame:
         specular=texture("RGBA16F"),
         depth=texture("DEPTH32F"),
     )
-    diffuse_direct, diffuse_indirect, glossy_direct, glossy_indirect = (texture("RGBA32F") for _ in range(4))
-    light = LightTargets(
-        device.target([diffuse_direct]),
-        device.target([diffuse_indirect]),
-        device.target([glossy_direct]),
-        device.target([glossy_indirect]),
-    )
+    light = LightTargets(**{name: device.target([texture("RGBA32F")]) for name in LIGHTS})
+    direct, indirect = ([getattr(light, f"{kind}_{way}").colors[0] for kind in ("diffuse", "glossy")] for way in WAYS)
+    needs = {"combined"}.union(*(p.needs for p in PASSES if p.key in passes))
+    names = [name for name in SUMS if name in needs]
+    sums = {name: texture("RGBA32F") for name in names}
+    parts = [tuple(names[first : first + SUMS_A_PASS]) for first in range(0, len(names), SUMS_A_PASS)]
+    geometry = (texture("RGBA32F"), texture("RGBA32F")) if needs & {"position_depth", "normal"} else ()
     resolved = texture("RGBA32F")
-    sums = {name: texture("RGBA32F") for name in SUMS}
-    geometry = (texture("RGBA32F"), texture("RGBA32F"))
     return Frame(
         width,
         height,
         gbuffer,
         device.target(gbuffer.colors, gbuffer.depth),
+        device.target([gbuffer.albedo, gbuffer.position], gbuffer.depth),
         light,
-        device.target([diffuse_direct, glossy_direct]),
-        device.target([diffuse_indirect, glossy_indirect]),
+        device.target(direct),
+        device.target(indirect),
         sums,
-        device.target(list(sums.values())),
+        {part: device.target([sums[name] for name in part]) for part in parts},
         geometry,
-        device.target(geometry),
+        device.target(geometry) if geometry else None,
         resolved,
         device.target([resolved]),
     )

@@ -101,6 +101,10 @@ class Material:
     roughness: float = 0.5  # 0..1, the square root of GGX's alpha
     layered: float = 1.0  # 0..1: how much of ``specular`` lies over the diffuse part and takes its light from it
 
+    @property
+    def is_glossy(self) -> bool:
+        return self.metallic > 0.0 or any(self.specular)
+
 
 class LightKind(Enum):
     POINT = "POINT"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...device.interface import Device, Target, Texture
-from ...scene.data import Light, Visibility
+from ...device.interface import Device, DrawState, Target, Texture
+from ...scene.data import Light, LightKind, Visibility
 from .draws import ADD, draw_scene, visible_draws
 from .inputs import FrameInputs
 from .light_maps import LightMaps, MapTile
@@ -27,6 +28,15 @@ LIGHTS_A_PASS = 16
 SHADOWS_DONE = 0.8
 
 
+@dataclass(frozen=True)
+class _Run:
+    """Neighbours in the table of lights that one program shades. ``kind``: the first three keys of DIRECT."""
+
+    kind: tuple[LightKind, bool, bool]
+    first: int
+    last: int
+
+
 class DirectLight:
     """Shadow maps and the light table of one renderer."""
 
@@ -34,21 +44,26 @@ class DirectLight:
         self.device = device
         self.maps = LightMaps(device, ["RG16F"])
         self.light_table: Texture | None = None
+        self._runs: tuple[_Run, ...] = ()
         self._up_to_date: tuple[int, bool, int] | None = None  # scene revision and settings of the last sample
         self._faces_of_still_lights: dict[Hashable, tuple[Face, ...]] = {}
 
-    def draw(self, inputs: FrameInputs, target: Target, *, filtered: bool, resolution: int) -> Iterator[float]:
-        """Write this sample's direct irradiance / pi into ``target``; yields progress 0..1.
+    def draw(
+        self, inputs: FrameInputs, target: Target, *, glossy: bool, filtered: bool, resolution: int
+    ) -> Iterator[float]:
+        """Write this sample's direct light into ``target``; yields progress 0..1.
 
+        ``target`` takes irradiance / pi, and with ``glossy`` the mirrored radiance as a second colour.
         ``filtered``: shadows of sized lights are filtered (PCSS) from one map kept as long as nothing moves; otherwise
         the map is drawn anew from a new point of the emitter every sample, which converges to the true penumbra.
         """
-        lights = inputs.gpu_scene.scene.lights
         for done in self._update(inputs, filtered, resolution):
             yield SHADOWS_DONE * done
-        for first in range(0, len(lights), LIGHTS_A_PASS):
-            self._shade(inputs, target, first, min(first + LIGHTS_A_PASS, len(lights)))
-            yield SHADOWS_DONE + (1.0 - SHADOWS_DONE) * first / len(lights)
+        if not self._runs:
+            self.device.clear(target)
+        for run in self._runs:
+            self._shade(inputs, target, run, glossy)
+            yield SHADOWS_DONE + (1.0 - SHADOWS_DONE) * run.last / self._runs[-1].last
 
     def free(self) -> None:
         self.maps.free()
@@ -74,15 +89,19 @@ class DirectLight:
 
     def _lay_out(self, inputs: FrameInputs, filtered: bool, resolution: int) -> None:
         tiles: list[MapTile] = []
-        rows = []
+        rows, kinds = [], []
         for index, light in enumerate(inputs.gpu_scene.scene.lights):
             moves = has_size(light) and not filtered
             source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index)) if moves else None
             faces = self._faces(light, inputs.gpu_scene.boxes, source)
             rows.append(light_row(light, source, len(tiles), len(faces)))
             tiles += [MapTile(light.key, index, face) for face in faces]
+            one_face = light.kind in (LightKind.SPOT, LightKind.SUN) and len(faces) == 1
+            kinds.append((light.kind, bool(rows[-1]["filtered"]), one_face))
         self.maps.lay_out(tiles, resolution)
-        self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+        order = sorted(range(len(rows)), key=lambda index: (kinds[index][0].name, *kinds[index][1:]))
+        self._runs = _runs([kinds[index] for index in order])
+        self.light_table = replace_table(self.device, LIGHT.pack([rows[i] for i in order]), self.light_table)
 
     def _faces(self, light: Light, boxes: np.ndarray, source: np.ndarray | None) -> tuple[Face, ...]:
         if not light.casts_shadow:
@@ -113,22 +132,36 @@ class DirectLight:
             )
             yield (done + 1) / len(stale)
 
-    def _shade(self, inputs: FrameInputs, target: Target, first: int, last: int) -> None:
+    def _shade(self, inputs: FrameInputs, target: Target, run: _Run, glossy: bool) -> None:
+        extra = {"specular_tx": inputs.gbuffer.specular, "pc_eye": inputs.eye} if glossy else {}
         self.device.fullscreen(
-            DIRECT,
+            DIRECT[*run.kind, glossy],
             target,
-            state=ADD,
+            state=ADD if run.first else DrawState(),  # the first covers what was there
             position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
             light_tx=self.light_table,
             face_tx=self.maps.face_table,
             shadow_depth_tx=self.maps.depth,
             shadow_slope_tx=self.maps.colors[0],
-            pc_first_light=first,
-            pc_last_light=last,
+            pc_first_light=run.first,
+            pc_last_light=run.last,
             pc_seed=inputs.noise_seed(0),
             pc_sample=inputs.sample,
+            **extra,
         )
+
+
+def _runs(kinds: Sequence[tuple[LightKind, bool, bool]]) -> tuple[_Run, ...]:
+    """The passes over a table of lights of these kinds: equal neighbours together, at most LIGHTS_A_PASS."""
+    runs, first = [], 0
+    while first < len(kinds):
+        last = first + 1
+        while last < min(len(kinds), first + LIGHTS_A_PASS) and kinds[last] == kinds[first]:
+            last += 1
+        runs.append(_Run(kinds[first], first, last))
+        first = last
+    return tuple(runs)
 
 
 def _offset(seed: int, light: int) -> np.ndarray:

@@ -1,21 +1,63 @@
-/* Add one sample to every pass. Lighting passes are kept times their colour and divided by it at the end, as Cycles
- * does, so that (direct + indirect) * colour is right on the edges too. */
+/* Add one sample to the sums that are wanted. Lighting passes are kept times their colour and divided by it at the end, as
+ * Cycles does, so that (direct + indirect) * colour is right on the edges too. */
+#include "lib/bxdf_lib.glsl"
+#include "lib/octahedron_lib.glsl"
 
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 albedo = texelFetch(albedo_tx, pixel, 0);
-  vec3 emission = texelFetch(emission_tx, pixel, 0).rgb;
-  vec3 direct = texelFetch(diffuse_direct_tx, pixel, 0).rgb * albedo.rgb;
-  vec3 indirect = texelFetch(diffuse_indirect_tx, pixel, 0).rgb * albedo.rgb;
-  vec3 glossy = texelFetch(glossy_direct_tx, pixel, 0).rgb + texelFetch(glossy_indirect_tx, pixel, 0).rgb;
   bool background = albedo.a == 0.0;
+  vec3 emission = background ? vec3(0.0) : texelFetch(emission_tx, pixel, 0).rgb;
+  vec3 direct = texelFetch(diffuse_direct_tx, pixel, 0).rgb * albedo.rgb;
+  vec3 indirect = vec3(0.0);
+  vec3 glossy_direct = vec3(0.0);
+  vec3 glossy_indirect = vec3(0.0);
+#ifdef GLOSSY
+  glossy_direct = texelFetch(glossy_direct_tx, pixel, 0).rgb;
+#endif
+#ifdef INDIRECT
+  indirect = texelFetch(diffuse_indirect_tx, pixel, 0).rgb * albedo.rgb;
+#ifdef GLOSSY
+  glossy_indirect = texelFetch(glossy_indirect_tx, pixel, 0).rgb;
+#endif
+#endif
   vec3 environment = background ? pc_background.rgb : vec3(0.0);
   float alpha = background ? pc_background.a : max(albedo.a, 0.0);
-  out_combined = vec4(direct + indirect + glossy + emission + environment, alpha);
+#ifdef WANT_COMBINED
+  out_combined = vec4(direct + indirect + glossy_direct + glossy_indirect + emission + environment, alpha);
+#endif
+#ifdef WANT_DIFFUSE_DIRECT
   out_diffuse_direct = vec4(direct, 0.0);
+#endif
+#ifdef WANT_DIFFUSE_INDIRECT
   out_diffuse_indirect = vec4(indirect, 0.0);
+#endif
+#ifdef WANT_DIFFUSE_COLOR
   out_diffuse_color = vec4(albedo.rgb, 0.0);
+#endif
+#ifdef WANT_EMISSION
   out_emission = vec4(emission, 0.0);
+#endif
+#ifdef WANT_ENVIRONMENT
   out_environment = vec4(environment, 0.0);
+#endif
+#ifdef WANT_GLOSSY_DIRECT
+  out_glossy_direct = vec4(glossy_direct, 0.0);
+#endif
+#ifdef WANT_GLOSSY_INDIRECT
+  out_glossy_indirect = vec4(glossy_indirect, 0.0);
+#endif
+#ifdef WANT_GLOSSY_COLOR
+  out_glossy_color = vec4(0.0);
+#ifdef GLOSSY
+  vec4 specular = texelFetch(specular_tx, pixel, 0);
+  if (albedo.a > 0.0 && specular.rgb != vec3(0.0)) {
+    vec3 P = texelFetch(position_tx, pixel, 0).xyz;
+    vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - P) : pc_eye.xyz;
+    vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
+    out_glossy_color = vec4(bxdf_albedo(specular.rgb, specular.a, dot(N, V)), 0.0);
+  }
+#endif
+#endif
 }

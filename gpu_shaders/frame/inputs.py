@@ -28,6 +28,7 @@ class GBuffer:
     ``position`` RGBA32F world position, w 1 where there is a surface. ``normal`` RGBA32F: shading normal and
     geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F: specular reflectance at normal
     incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the square root of GGX's alpha.
+    Where there is no surface only ``albedo`` and ``position`` hold something: zero.
     """
 
     albedo: Texture
@@ -47,7 +48,7 @@ class LightTargets:
     """Where a sample's light goes: four targets of one RGBA32F colour each, one texel a pixel.
 
     The diffuse ones hold irradiance / pi, which the albedo is not in; the glossy ones radiance toward the eye, which
-    the specular reflectance is in.
+    the specular reflectance is in, and stay zero where the scene has no specular lobe at all (``GpuScene.is_glossy``).
     """
 
     diffuse_direct: Target

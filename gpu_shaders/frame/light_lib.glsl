@@ -49,6 +49,48 @@ float light_round_cosine(float cosine, float sine_squared)
   return max((cosine * acos(y) - x * w) / MATH_PI + atan(w / x) / (MATH_PI * sine_squared), 0.0);
 }
 
+/* The place of `source` on a round emitter, which seen along the unit vector `axis` is an even disc around its centre. */
+vec3 light_round_place(Light light, vec3 axis, vec3 source)
+{
+  vec3 place = source - light.position;
+  return place - axis * dot(axis, place);
+}
+
+/* The unit direction to that place from a distance of 1 / `inverse` to the centre. */
+vec3 light_round_direction(Light light, vec3 axis, float inverse, vec3 place)
+{
+  if (light.soft_radius_squared > 0.0) {
+    return normalize(axis + place * inverse);
+  }
+  return axis * sqrt(max(1.0 - dot(place, place) * inverse * inverse, 0.0)) + place * inverse;
+}
+
+/* The unit direction from P to the point `source` of any emitter. */
+vec3 light_direction(Light light, vec3 P, vec3 source)
+{
+  if (light.kind == LIGHT_SUN) {
+    return source;
+  }
+  if (light.kind == LIGHT_AREA) {
+    vec3 to_light = source - P;
+    return to_light * inversesqrt(max(dot(to_light, to_light), 1e-20));
+  }
+  vec3 center = light.position - P;
+  float inverse = inversesqrt(max(dot(center, center), 1e-20));
+  vec3 axis = center * inverse;
+  return light_round_direction(light, axis, inverse, light_round_place(light, axis, source));
+}
+
+/* How wide the emitter is seen from P: about the tangent of half its angle. */
+float light_width(Light light, vec3 P)
+{
+  if (light.kind == LIGHT_SUN) {
+    return light.emitter_radius;
+  }
+  vec3 center = light.position - P;
+  return light.emitter_radius * inversesqrt(max(dot(center, center), 1e-20));
+}
+
 /* Irradiance / pi from a point or spot light, `source` one point of its emitter (lights.emitter_sample). */
 vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
 {
@@ -61,11 +103,8 @@ vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
   }
   float inverse = inversesqrt(squared);
   vec3 axis = center * inverse;
-  /* Seen from P the emitter is an even disc around its centre: the source's place in it. */
-  vec3 place = source - light.position;
-  place -= axis * dot(axis, place);
-  vec3 w =
-      disc ? normalize(center + place) : axis * sqrt(max(1.0 - dot(place, place) / squared, 0.0)) + place * inverse;
+  vec3 place = light_round_place(light, axis, source);
+  vec3 w = light_round_direction(light, axis, inverse, place);
   vec3 intensity = light_intensity(light, -w) / MATH_PI;
   if (light.filtered != 0 && light.kind == LIGHT_POINT) {
     float seen = squared + light.soft_radius_squared;

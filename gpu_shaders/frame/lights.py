@@ -33,9 +33,13 @@ def half_size(light: Light) -> tuple[float, float]:
 
 
 def intensity(light: Light) -> np.ndarray:
-    """(3,) W/sr of a point or spot, W/sr along the axis of an area light, W/m² of a sun."""
+    """(3,) W/sr of a point or spot, W/sr along the axis of an area light, W/m² of a sun: for diffuse reflection."""
+    return _plain_intensity(light) * light.diffuse_factor
+
+
+def _plain_intensity(light: Light) -> np.ndarray:
     scale = {LightKind.SUN: 1.0, LightKind.AREA: 1.0 / math.pi}.get(light.kind, 1.0 / (4.0 * math.pi))
-    return np.asarray(light.power, np.float64) * light.diffuse_factor * scale
+    return np.asarray(light.power, np.float64) * scale
 
 
 def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.ndarray:
@@ -112,7 +116,7 @@ def light_row(light: Light, source: np.ndarray | None, first_face: int, face_cou
     spot_cosine = math.cos(0.5 * (light.angle if light.kind is LightKind.SUN else light.spot_angle))
     is_disc = light.soft_falloff and light.kind in (LightKind.POINT, LightKind.SPOT)
     tangent, normalize = _spread(light)
-    filtered = source is None
+    filtered = source is None and has_size(light)
     if source is None:
         source = axes[:, 2] if light.kind is LightKind.SUN else center
     return {
@@ -125,6 +129,7 @@ def light_row(light: Light, source: np.ndarray | None, first_face: int, face_cou
         "spot_smooth": 1.0 / max((1.0 - spot_cosine) * light.spot_blend, 1e-7),
         "soft_radius_squared": light.radius**2 if is_disc else 0.0,
         "intensity": intensity(light),
+        "specular_intensity": _plain_intensity(light) * light.specular_factor,
         "face_count": face_count,
         "source": source,
         "first_face": first_face,

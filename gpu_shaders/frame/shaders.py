@@ -1,7 +1,23 @@
 """Declarations of the passes that every frame has."""
 
+from collections.abc import Sequence
+
 from ...device.shader import Shader
+from ...scene.data import LightKind
 from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+
+# What a picture can keep a sum of.
+SUMS = (
+    "combined",
+    "diffuse_direct",
+    "diffuse_indirect",
+    "diffuse_color",
+    "emission",
+    "environment",
+    "glossy_direct",
+    "glossy_indirect",
+    "glossy_color",
+)
 
 MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3", "in_base_uv": "VEC2", "in_emission_uv": "VEC2"}
 MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3", "v_base_uv": "VEC2", "v_emission_uv": "VEC2"}
@@ -57,44 +73,70 @@ SHADOW = Shader(
     depth_write=True,
 )
 
-DIRECT = Shader(
-    name="frame_direct",
-    fragment="frame/frame_direct_frag.glsl",
-    outputs={"out_direct": "VEC4"},
-    samplers={
-        "position_tx": "FLOAT_2D",
-        "normal_tx": "FLOAT_2D",
-        "light_tx": "FLOAT_2D",
-        "face_tx": "FLOAT_2D",
-        "shadow_depth_tx": "FLOAT_2D",
-        "shadow_slope_tx": "FLOAT_2D",
-    },
-    structs=(LIGHT, MAP_FACE),
-    constants={"pc_first_light": "INT", "pc_last_light": "INT", "pc_seed": "INT", "pc_sample": "INT"},
-    defines=(*LIGHT_DEFINES, *MAP_DEFINES),
-)
 
-ACCUMULATE = Shader(
-    name="frame_accumulate",
-    fragment="frame/frame_accumulate_frag.glsl",
-    outputs={
-        "out_combined": "VEC4",
-        "out_diffuse_direct": "VEC4",
-        "out_diffuse_indirect": "VEC4",
-        "out_diffuse_color": "VEC4",
-        "out_emission": "VEC4",
-        "out_environment": "VEC4",
-    },
-    samplers={
-        "albedo_tx": "FLOAT_2D",
-        "emission_tx": "FLOAT_2D",
-        "diffuse_direct_tx": "FLOAT_2D",
-        "diffuse_indirect_tx": "FLOAT_2D",
-        "glossy_direct_tx": "FLOAT_2D",
-        "glossy_indirect_tx": "FLOAT_2D",
-    },
-    constants={"pc_background": "VEC4"},
-)
+def _direct(kind: LightKind, filtered: bool, one_face: bool, glossy: bool) -> Shader:
+    """Direct light of lights of one kind: ``filtered`` shadows or not, one shadow map face or any number of them."""
+    words = [
+        "frame_direct",
+        kind.name.lower(),
+        *(["filtered"] if filtered else []),
+        *(["one_face"] if one_face else []),
+    ]
+    defines = [("LIGHT_KIND", f"LIGHT_{kind.name}"), ("LIGHT_FILTERED", str(int(filtered)))]
+    defines += [("LIGHT_ONE_FACE", "1")] if one_face else []
+    defines += [("GLOSSY", "1")] if glossy else []
+    return Shader(
+        name="_".join([*words, *(["glossy"] if glossy else [])]),
+        fragment="frame/frame_direct_frag.glsl",
+        outputs={"out_diffuse": "VEC4", **({"out_glossy": "VEC4"} if glossy else {})},
+        samplers={
+            "position_tx": "FLOAT_2D",
+            "normal_tx": "FLOAT_2D",
+            **({"specular_tx": "FLOAT_2D"} if glossy else {}),
+            "light_tx": "FLOAT_2D",
+            "face_tx": "FLOAT_2D",
+            "shadow_depth_tx": "FLOAT_2D",
+            "shadow_slope_tx": "FLOAT_2D",
+        },
+        structs=(LIGHT, MAP_FACE),
+        constants={
+            **({"pc_eye": "VEC4"} if glossy else {}),
+            "pc_first_light": "INT",
+            "pc_last_light": "INT",
+            "pc_seed": "INT",
+            "pc_sample": "INT",
+        },
+        defines=(*LIGHT_DEFINES, *MAP_DEFINES, *defines),
+    )
+
+
+# By (kind, filtered, one face, glossy). One program for all would run through what every kind needs, for every light.
+DIRECT = {
+    (kind, filtered, one_face, glossy): _direct(kind, filtered, one_face, glossy)
+    for kind in LightKind
+    for filtered in (False, True)
+    for one_face in ((False, True) if kind in (LightKind.SPOT, LightKind.SUN) else (False,))
+    for glossy in (False, True)
+}
+
+
+def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool) -> Shader:
+    """Add a sample to up to six ``sums`` of SUMS. Without ``glossy`` or ``indirect`` that light is taken for none."""
+    light = ["diffuse_direct", *(["diffuse_indirect"] if indirect else [])]
+    light += ["glossy_direct", *(["glossy_indirect"] if indirect else [])] if glossy else []
+    albedo = glossy and "glossy_color" in sums
+    samplers = ["albedo", "emission", *light, *(["position", "normal", "specular"] if albedo else [])]
+    defines = [f"WANT_{name.upper()}" for name in sums]
+    defines += [name for name, wanted in (("GLOSSY", glossy), ("INDIRECT", indirect)) if wanted]
+    return Shader(
+        name="_".join(["frame_accumulate", *(d.lower() for d in defines if "_" not in d), sums[0]]),
+        fragment="frame/frame_accumulate_frag.glsl",
+        outputs={f"out_{name}": "VEC4" for name in sums},
+        samplers={f"{name}_tx": "FLOAT_2D" for name in samplers},
+        constants={"pc_background": "VEC4", **({"pc_eye": "VEC4"} if albedo else {})},
+        defines=tuple((name, "1") for name in defines),
+    )
+
 
 GEOMETRY = Shader(
     name="frame_geometry",
@@ -119,4 +161,9 @@ DISPLAY = Shader(
     samplers={"image_tx": "FLOAT_2D"},
 )
 
-SHADERS = (GBUFFER, SHADOW, DIRECT, ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY)
+# The accumulations of a viewport, and of a final render with all passes.
+_ACCUMULATE = tuple(
+    accumulate(sums, glossy=lit, indirect=lit) for sums in (SUMS[:1], SUMS[:6], SUMS[6:]) for lit in (False, True)
+)
+
+SHADERS = (GBUFFER, SHADOW, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY)

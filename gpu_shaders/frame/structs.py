@@ -39,12 +39,13 @@ LIGHT = Struct(
     face_count="int",  # shadow map faces, 0: casts no shadow
     source="vec3",  # this frame's point on the emitter; sun: unit direction to it
     first_face="int",
-    filtered="int",  # 1: PCSS from the centre, 0: the map was drawn from `source`
+    filtered="int",  # 1: PCSS from the centre of a sized emitter, 0: the map was drawn from `source`
     half_size="vec2",  # area: half extents, metres
     spread_tangent="float",  # area: tangent of half the spread, -1: none
     spread_normalize="float",
     emitter_radius="float",  # emitter radius for PCSS, metres; sun: tangent of half the angle
     round_shape="int",  # area: 1 for disk and ellipse
+    specular_intensity="vec3",  # as `intensity`, for what surfaces mirror
 )
 
 MAP_FACE = Struct(
