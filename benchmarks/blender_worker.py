@@ -97,7 +97,8 @@ class Worker:
 
 
 def _configure(scene, job: Job) -> None:
-    engines = bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items.keys()
+    engine: Any = bpy.types.RenderSettings.bl_rna.properties["engine"]
+    engines = engine.enum_items.keys()
     eevee = "BLENDER_EEVEE_NEXT" if "BLENDER_EEVEE_NEXT" in engines else "BLENDER_EEVEE"
     if job.engine == REBOUND:
         rebound.register()

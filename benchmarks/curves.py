@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rebound.device import Device
 from rebound.device.headless import HeadlessDevice
 from rebound.scene.data import Scene, View
 from rebound.scene.snapshot import load_snapshot
@@ -196,7 +197,7 @@ def steady_frame(
     return first, statistics.median(times[1:]), frame_passes(device, scene, view, settings, frames)
 
 
-def frame_passes(device: HeadlessDevice, scene: Scene, view: View, settings: Settings, frames: int) -> list[Pass]:
+def frame_passes(device: Device, scene: Scene, view: View, settings: Settings, frames: int) -> list[Pass]:
     """The passes of a steady frame: each one's median."""
     timed = TimedDevice(device)
     studio = Studio(timed.as_device, settings)
@@ -219,7 +220,7 @@ def _final_renders(truth: Truth, plan: Plan, kept: Path, pictures: _Pictures, sa
     curves = []
     for method in methods():
         counts = (plan.rebound[0], plan.rebound[-1])
-        job = Job(str(truth.case.blend), REBOUND, size=truth.size, settings=method.changed)
+        job = Job(str(truth.case.blend), REBOUND, size=truth.size, settings=dict(method.changed))
         jobs = [replace(job, cold=True), *(replace(job, samples=n, runs=plan.runs) for n in counts)]
         cold, *warm = do(jobs, kept, say)
         curves.append(_curve(REBOUND, f"{method.label}{F12}", cold, counts, warm, truth, pictures))

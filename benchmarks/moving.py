@@ -144,8 +144,8 @@ def measure_ghost(
 ) -> list[Figure]:
     """What is left of the state before, SHOWN frames after something jumped, and of noise beside it.
 
-    The ghost is the part of the old picture in the new one: what is wrong, projected onto the change, which noise does
-    not bias. 1 would be the old picture still standing there, 0 none of it.
+    The ghost is the part of the old picture in the new one: what differs from a fresh picture of as many frames,
+    projected onto the change, which noise does not bias. 1 would be the old picture still standing there.
     """
     settings = method.settings(viewport=True)
     studio = Studio(device, settings)
@@ -163,7 +163,7 @@ def measure_ghost(
     judged, fresh, truth, old = cells(judged), cells(fresh), cells(truth), cells(old)
     change = old - truth
     mean = float(np.abs(change).mean()) or 1.0
-    left = float((change * (judged - truth)).sum() / max((change**2).sum(), 1e-12))
+    left = float((change * (judged - fresh)).sum() / max((change**2).sum(), 1e-12))
     difference, noise = float(np.abs(judged - fresh).mean()) / mean, float(np.abs(fresh - truth).mean()) / mean
     return [
         Figure(f"{what}: left of the picture before, {SHOWN} frames after", left, "of the change"),

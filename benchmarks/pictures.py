@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,9 @@ def quantity(passes: Mapping[str, Array], name: str, direct: Array | None = None
 def save_picture(path: Path, passes: Mapping[str, Array]) -> None:
     """Keep the passes that are compared and shown, in half precision."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    kept = {name: np.clip(passes[name], -65000, 65000).astype(np.float16) for name in KEPT_PASSES if name in passes}
+    kept: dict[str, Any] = {
+        name: np.clip(passes[name], -65000, 65000).astype(np.float16) for name in KEPT_PASSES if name in passes
+    }
     with open(path, "wb") as file:
         np.savez_compressed(file, **{name.replace(" ", "_"): array for name, array in kept.items()})
 

@@ -17,6 +17,7 @@ MARKERS = ("circle", "square", "diamond", "triangle")
 WIDTH, HEIGHT = 640, 330
 LEFT, RIGHT, TOP, BOTTOM = 64, 16, 34, 46
 LEGEND_ROW = 18
+LEAST, MOST = 1e-30, 1e30  # beyond is no measurement
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Line:
 
     @property
     def shown(self) -> list[tuple[float, float]]:
-        return [(x, y) for x, y in self.points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y)]
+        return [(x, y) for x, y in self.points if LEAST < x < MOST and LEAST < y < MOST]
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class _Axis:
     @classmethod
     def over(cls, values: Sequence[float], begin: float, end: float) -> _Axis:
         low, high = (min(values), max(values)) if values else (1.0, 10.0)
-        margin = max((high / low) ** 0.06, 1.1)
+        margin = max((high / low) ** 0.06, 2.0 / math.sqrt(high / low), 1.1)  # never less than a factor of 4 in all
         return cls(low / margin, high * margin, begin, end)
 
     def place(self, value: float) -> float:

@@ -174,7 +174,15 @@ def _spots(count: int) -> list[Light]:
         matrix = np.eye(4)
         matrix[:3, 3] = (i % side + 0.5) * cell - HALL / 2, (i // side + 0.5) * cell - HALL / 2, LIGHT_HEIGHT
         found.append(
-            Light(i, f"Spot {i}", LightKind.SPOT, (power,) * 3, matrix, spot_angle=max(angle, 0.9), spot_blend=0.2)
+            Light(
+                i,
+                f"Spot {i}",
+                LightKind.SPOT,
+                (power, power, power),
+                matrix,
+                spot_angle=max(angle, 0.9),
+                spot_blend=0.2,
+            )
         )
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ class Method:
     """A way to compute indirect light, by the settings that choose it."""
 
     label: str
-    changed: dict[str, Value]
+    changed: Mapping[str, Value]
 
     def settings(self, *, viewport: bool, **more: Value) -> Settings:
         """The defaults but for what makes the method, and ``more``."""

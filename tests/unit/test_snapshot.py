@@ -200,7 +200,8 @@ def test_missing_file_is_missing(tmp_path):
 
 
 def test_cut_off_file_is_refused(tmp_path):
-    round_trip(tmp_path, Scene({"m": Mesh("m", *[np.ones((3, 3), np.float32)] * 2, {}, "", (), np.ones((2, 3)))}))
+    ones = np.ones((3, 3), np.float32)
+    round_trip(tmp_path, Scene({"m": Mesh("m", ones, 2 * ones, {}, "", (), ones[:2])}))
     whole = (tmp_path / "snapshot.npz").read_bytes()
     for length in range(0, len(whole), max(len(whole) // 40, 1)):
         (tmp_path / "cut.npz").write_bytes(whole[:length])
