@@ -44,7 +44,7 @@ void main()
 
   gl_FragDepth = pc_perspective != 0 ? map_depth(1.0 / (pc_far * gl_FragCoord.w)) : clamp(gl_FragCoord.z, 0.0, 1.0);
   out_position_area = vec4(v_position, area);
-  out_normal = vec4(normal, 1.0);
-  out_flux = vec4(flux, float(pc_light + 1));
+  out_normal = vec4(normal, float(SOURCE_BOUNCE));
+  out_flux = vec4(flux, 1.0);
   out_specular = vec4(0.0);
 }

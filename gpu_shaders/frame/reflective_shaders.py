@@ -1,8 +1,23 @@
 """Declaration of the pass that draws reflective shadow maps."""
 
+from enum import IntEnum
+
 from ...device.shader import Shader
 from .shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
 from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+
+
+
+class SourceKind(IntEnum):
+    """What a texel of an atlas of light sources stands for, in its normal's fourth channel; 0: nothing."""
+
+    BOUNCE = 1  # light that a lamp's surroundings reflect
+    EMISSION = 2  # an emissive surface
+    CACHE = 3  # a point of a surface, for the light that it reflects after more bounces
+    SKY = 4  # a patch of the world's background, far away
+
+
+SOURCE_DEFINES = tuple((f"SOURCE_{kind.name}", str(int(kind))) for kind in SourceKind)
 
 REFLECT = Shader(
     name="frame_reflective_draw",
@@ -24,6 +39,6 @@ REFLECT = Shader(
         "pc_texel_measure": "FLOAT",  # see reflective_draw_frag.glsl
         "pc_served": "INT",
     },
-    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES),
+    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES, *SOURCE_DEFINES),
     depth_write=True,
 )

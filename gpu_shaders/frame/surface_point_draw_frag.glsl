@@ -17,11 +17,11 @@ void main()
   out_position_area = vec4((world_from_object * vec4(point.position, 1.0)).xyz, point.area);
   if (pc_emits != 0) {
     /* What leaves a surface does so by its true cosine, whatever its shading. */
-    out_normal = vec4(geometric, 2.0);
+    out_normal = vec4(geometric, float(SOURCE_EMISSION));
     out_flux = vec4(MATH_PI * point.area * max(surface.emission, vec3(0.0)), 1.0);
     out_reflectance = vec4(0.0);
   } else {
-    out_normal = vec4(normal, 1.0);
+    out_normal = vec4(normal, float(SOURCE_CACHE));
     out_flux = vec4(0.0, 0.0, 0.0, 1.0);
     out_reflectance = vec4(surface.albedo, 1.0);
   }

@@ -13,6 +13,7 @@ from ...device.structs import Struct
 from ...scene.data import Material, Visibility
 from ...scene.surface_points import Part, Points, SurfaceSampler, emission_density, gram_matrices
 from .draws import visible_draws
+from .reflective_shaders import SOURCE_DEFINES
 from .shaders import MESH_SAMPLERS
 from .structs import IMAGE_DEFINES, INSTANCE, MATERIAL
 from .tables import replace_table
@@ -47,14 +48,14 @@ SURFACE_POINT_DRAW = Shader(
     samplers={**MESH_SAMPLERS, "point_tx": "FLOAT_2D"},
     structs=(INSTANCE, MATERIAL, SURFACE_POINT),
     constants={"pc_first_point": "INT", "pc_side": "INT", "pc_material": "INT", "pc_emits": "INT"},
-    defines=IMAGE_DEFINES,
+    defines=(*IMAGE_DEFINES, *SOURCE_DEFINES),
 )
 
 
 class SurfacePoints:
     """A square of points on what bounces light: of kind AREA spread evenly, of EMISSION by what is emitted.
 
-    Colour textures: world position and area (RGBA32F), unit normal and 1 (AREA) or 2 (EMISSION), flux in watts
+    Colour textures: world position and area (RGBA32F), unit normal and SourceKind, flux in watts
     (RGBA32F; AREA: 0), diffuse reflectance (EMISSION: 0). A point is on one side of its surface and its area is of
     sides: all areas add up to SIDES times ``total_area``, and flux is pi times radiance times area. Points of AREA have
     the shading normal, those of EMISSION the geometric one.

@@ -16,12 +16,22 @@ from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import Voxels
 from ..technique import Item, Setting, Value
+from ..frame.reflective_shaders import SourceKind
+from .cache import Cache
+from .index import PointIndex
 from .pool import Pool
 from .shaders import GATHER, SHADERS, UPSAMPLE
-from .sources import SKY_PATCHES, Sources
+from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
 
 # How far a sample is after each step, for the progress bar.
-MAPS_DONE, VOXELS_DONE, POOL_DONE, GATHER_DONE = 0.2, 0.4, 0.45, 0.9
+MAPS_DONE, VOXELS_DONE, CACHE_DONE, GATHER_DONE = 0.2, 0.4, 0.6, 0.95
+# Updates of the cache before the first picture, each of which takes light a bounce further.
+WARM_UP = 12
+# Where light goes on, so many updates of a point after a change are forgotten at once, for they lack light of further
+# bounces; then its mean is of this newer part of them.
+FORGOTTEN, NEWER = 4, 0.5
+ALL_KINDS = sum(1 << kind for kind in SourceKind)
+FIRST_HAND = 1 << SourceKind.EMISSION | 1 << SourceKind.SKY  # light of which the cache's points send the first bounce
 STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}
 
 SETTINGS = (
@@ -77,6 +87,29 @@ SETTINGS = (
         unit="lights",
     ),
     Setting(
+        "bounces",
+        "ENUM",
+        "Bounces",
+        "How often light is reflected before it reaches what the camera sees",
+        "ONE",
+        items=(
+            Item("ONE", "1", "Light that was reflected once: quickest, and darker than life in closed rooms"),
+            Item("MANY", "Many", "Light goes on until nothing is left of it, at the cost of time"),
+        ),
+    ),
+    Setting(
+        "cache_rows",
+        "INT",
+        "Cache Updates",
+        "How many 64ths of the points that hold light for further bounces gather in each sample. More follows changes "
+        "sooner and is calmer, at the cost of time",
+        64,
+        viewport_default=4,
+        minimum=1,
+        maximum=64,
+        unit="rows of 64 points",
+    ),
+    Setting(
         "voxels",
         "INT",
         "Voxels",
@@ -87,6 +120,16 @@ SETTINGS = (
         minimum=64,
         maximum=1024,
         unit="voxels",
+    ),
+    Setting(
+        "bound",
+        "FLOAT",
+        "Bound",
+        "The most that one virtual light of an emissive surface may give, in parts of that surface's radiance. Lower "
+        "has fewer bright dots beside emitters, which it also darkens; 0 sets no bound",
+        4.0,
+        minimum=0.0,
+        maximum=1000.0,
     ),
     Setting(
         "occlusion",
@@ -112,20 +155,24 @@ class Vpl:
         self.sources = Sources(device)
         self.voxels = Voxels(device)
         self.pool = Pool(device)
+        self.cache = Cache(device)
+        self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
+        self._sorted = -1  # revision of the sources that the indices were made for
         self._coarse: tuple[Texture, Texture, Target] | None = None
-        self._both: tuple[Target, Target] | None = None
+        self._cache_updates = 0.0  # of every point since the scene changed
+        self._cache_revision = -1  # of the scene that the cache last gathered in
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """See ``Technique.indirect``."""
         gpu_scene = inputs.gpu_scene
-        for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache=False):
+        for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache=self._wants_cache(inputs, settings)):
             yield MAPS_DONE * done
         if not self.sources.tiles:
             return
         for done in self.voxels.update(gpu_scene, int(settings["voxels"])):
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done
-        self.pool.draw(self.sources, int(settings["pool"]), inputs.noise_seed(1) + 16 * inputs.sample)
-        yield POOL_DONE
+        for done in self._fill_pool(inputs, settings):
+            yield VOXELS_DONE + (CACHE_DONE - VOXELS_DONE) * done
         stride = STRIDES[str(settings["scale"])]
         offset = _grid_offset(inputs, stride)
         indirect, direct, target = self._coarse_target(inputs, stride)
@@ -135,8 +182,7 @@ class Vpl:
             position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
             **self._candidate_bindings(inputs, settings),
-            pc_candidates=int(settings["candidates"]),
-            pc_occluded=int(settings["occlusion"]),
+            pc_kinds=ALL_KINDS,
             pc_stride=stride,
             pc_offset=offset,
         )
@@ -153,6 +199,55 @@ class Vpl:
                 pc_offset=offset,
             )
 
+    def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
+        """Whether some light's first or further bounces come from the cache."""
+        scene = inputs.gpu_scene.scene
+        emits = any(any(material.emission) for material in scene.materials)
+        return settings["bounces"] == "MANY" or emits or any(scene.world.color)
+
+    def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
+        """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
+        count, seed = int(settings["pool"]), inputs.noise_seed(1) + 64 * inputs.sample
+        if self._sorted != self.sources.revision:
+            self._sort_points()
+            self._sorted = self.sources.revision
+        tile = self.sources.tile_of(CACHE)
+        if tile is None:
+            self.pool.draw(self.sources, count, seed)
+            return
+        many = settings["bounces"] == "MANY"
+        rounds, rows = 1, int(settings["cache_rows"])
+        if self._cache_revision < 0:
+            rounds, rows = (WARM_UP if many else 1), POINTS_SIDE
+        if self._cache_revision != inputs.gpu_scene.revision:
+            self._cache_revision = inputs.gpu_scene.revision
+            self._cache_updates = float(FORGOTTEN - rounds) if many else 0.0
+        for number in range(rounds):
+            self.cache.emit(self.sources, tile)
+            self.pool.draw(self.sources, count, seed + number)
+            candidates = {**self._candidate_bindings(inputs, settings), "pc_kinds": ALL_KINDS if many else FIRST_HAND}
+            candidates["pc_sample"] = WARM_UP * inputs.sample + number
+            counting = max(self._cache_updates - FORGOTTEN, 0.0) * NEWER if many else self._cache_updates
+            self.cache.gather(self.sources, tile, candidates, rows, counting)
+            if self._cache_updates < 2 * FORGOTTEN:  # points come to light
+                self.cache.emit(self.sources, tile)
+                self._sort_points()
+            self._cache_updates += rows / POINTS_SIDE
+            yield (number + 1) / rounds
+
+    def _sort_points(self) -> None:
+        """Have the indices of surface points match the atlas."""
+        assert self.voxels.grid is not None
+        for owner, index in self._indices.items():
+            tile = self.sources.tile_of(owner)
+            if tile is not None:
+                index.update(self.sources, tile, self.voxels.grid)
+
+    def _points(self, owner: str) -> tuple[int, int, int]:
+        """Where a kind of surface points lies in the atlas: lower left texel and side, 0 where there are none."""
+        tile = self.sources.tile_of(owner)
+        return self.sources.points_viewport(tile)[:3] if tile else (0, 0, 0)
+
     def statistics(self) -> Mapping[str, float]:
         atlas = self.sources.atlas
         return {
@@ -166,6 +261,9 @@ class Vpl:
         self.sources.free()
         self.voxels.free()
         self.pool.free()
+        self.cache.free()
+        for index in self._indices.values():
+            index.free()
         for resource in self._coarse or ():
             self.device.free(resource)
         self._coarse = None
@@ -183,10 +281,18 @@ class Vpl:
             "face_tx": self.sources.face_table,
             **self.pool.bindings(),
             **self.voxels.bindings(),
+            "cache_index_tx": self._indices[CACHE].texture,
+            "emitter_index_tx": self._indices[EMITTERS].texture,
+            "pc_index": self._indices[CACHE].place,
+            "pc_cache": self._points(CACHE),
+            "pc_emitters": self._points(EMITTERS),
             "pc_sky": self.sources.viewport(sky) if sky else (0, 0, 0, 0),
             "pc_sample": inputs.sample,
             "pc_seed": inputs.noise_seed(2),
             "pc_pool": int(settings["pool"]),
+            "pc_candidates": int(settings["candidates"]),
+            "pc_bound": float(settings["bound"]),
+            "pc_occluded": int(settings["occlusion"]),
             "pc_tiles": len(self.sources.tiles),
             "pc_light_tiles": self.sources.light_tiles,
         }

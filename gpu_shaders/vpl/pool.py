@@ -72,35 +72,29 @@ class Pool:
         assert sources.atlas is not None
         tile, blocks = sources.atlas.tile, _blocks(sources.atlas.tile)
         columns, rows = (side // tile for side in sources.atlas.size)
-        self._allocate(
-            {
-                "fine": (columns * tile // FINE, rows * tile // FINE),
-                "middle": (columns * tile // MIDDLE, rows * tile // MIDDLE),
-                "coarse": (columns * blocks, rows * blocks),
-                "sums": (len(sources.tiles), 1),
-            }
-        )
-        levels = self._levels
-        self.device.fullscreen(
-            LUMINANCE, levels["fine"][1], flux_tx=sources.colors[2], specular_tx=sources.colors[3]
-        )
-        for child, parent, children, parents in (
-            ("fine", "middle", tile // FINE, tile // MIDDLE),
-            ("middle", "coarse", tile // MIDDLE, blocks),
-        ):
+        sides = {"fine": tile // FINE, "middle": tile // MIDDLE, "coarse": blocks}
+        sizes = {name: (columns * side, rows * side) for name, side in sides.items()}
+        self._allocate({**sizes, "sums": (len(sources.tiles), 1)})
+        self._revision = sources.revision
+        fluxes, speculars = sources.colors[2:4]
+        self.device.fullscreen(LUMINANCE, self._levels["fine"][1], flux_tx=fluxes, specular_tx=speculars)
+        for child, parent in (("fine", "middle"), ("middle", "coarse")):
             self.device.fullscreen(
-                REDUCE, levels[parent][1], level_tx=levels[child][0], pc_children=children, pc_parents=parents
+                REDUCE,
+                self._levels[parent][1],
+                level_tx=self._levels[child][0],
+                pc_children=sides[child],
+                pc_parents=sides[parent],
             )
         self.device.fullscreen(
             TILES,
-            levels["sums"][1],
-            level_tx=levels["coarse"][0],
+            self._levels["sums"][1],
+            level_tx=self._levels["coarse"][0],
             tile_tx=sources.tile_table,
             pc_tile=tile,
             pc_blocks=blocks,
             pc_light_tiles=sources.light_tiles,
         )
-        self._revision = sources.revision
 
     def _allocate(self, sizes: Mapping[str, tuple[int, int]]) -> None:
         if {name: texture.size for name, (texture, _) in self._levels.items()} == dict(sizes):

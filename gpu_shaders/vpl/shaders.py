@@ -1,19 +1,23 @@
 """Declarations of the passes of virtual point lights."""
 
 from ...device.shader import Shader
+from ..frame.reflective_shaders import SOURCE_DEFINES
 from ..frame.structs import LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE
 from ..frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS
-from .structs import KIND_DEFINES, PYRAMID_STEP, TILE
+from .structs import PYRAMID_STEP, TILE
 
 # Entries of the pool in one row of its textures.
 POOL_ROW = 64
-_DEFINES = (*KIND_DEFINES, ("VPL_POOL_ROW", str(POOL_ROW)), ("PYRAMID_STEP", str(PYRAMID_STEP)))
+# Cells of the cache's index along a side.
+INDEX_CELLS = 32
+_INDEX = (("VPL_INDEX", str(INDEX_CELLS)),)
+_DEFINES = (*SOURCE_DEFINES, *_INDEX, ("VPL_POOL_ROW", str(POOL_ROW)), ("PYRAMID_STEP", str(PYRAMID_STEP)))
 
 SKY = Shader(
     name="vpl_sky",
     fragment="vpl/vpl_sky_frag.glsl",
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_specular": "VEC4"},
-    constants={"pc_sphere": "VEC4", "pc_radiance": "VEC3", "pc_viewport": "VEC4"},
+    constants={"pc_sphere": "VEC4", "pc_radiance": "VEC3", "pc_counts": "FLOAT", "pc_viewport": "VEC4"},
     defines=_DEFINES,
 )
 
@@ -81,10 +85,15 @@ _CANDIDATES = {
     "tile_tx": "FLOAT_2D",
     "light_tx": "FLOAT_2D",
     "face_tx": "FLOAT_2D",
+    "cache_index_tx": "FLOAT_2D",
+    "emitter_index_tx": "FLOAT_2D",
     **VOXEL_SAMPLERS,
 }
 _CANDIDATE_CONSTANTS = {
-    "pc_sky": "VEC4",
+    "pc_sky": "VEC4",  # lower left texel and sides of the sky's tile, 0: none
+    "pc_index": "VEC4",
+    "pc_cache": "VEC3",  # lower left texel and side of the cache's points, 0: none
+    "pc_emitters": "VEC3",  # the same of the emitters'
     "pc_sample": "INT",
     "pc_seed": "INT",
     "pc_pool": "INT",
@@ -92,6 +101,8 @@ _CANDIDATE_CONSTANTS = {
     "pc_light_tiles": "INT",
     "pc_candidates": "INT",
     "pc_occluded": "INT",
+    "pc_bound": "FLOAT",
+    "pc_kinds": "INT",  # bits: the kinds of source that are asked
 }
 
 GATHER = Shader(
@@ -113,4 +124,51 @@ UPSAMPLE = Shader(
     constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
 )
 
-SHADERS = (SKY, LUMINANCE, REDUCE, TILES, POOL, GATHER, UPSAMPLE)
+CACHE_FADE = Shader(
+    name="vpl_cache_fade",
+    fragment="vpl/vpl_cache_fade_frag.glsl",
+    outputs={"out_sum": "VEC4"},
+    samplers={"sum_tx": "FLOAT_2D"},
+    constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
+)
+
+CACHE_GATHER = Shader(
+    name="vpl_cache_gather",
+    fragment="vpl/vpl_cache_gather_frag.glsl",
+    outputs={"out_sum": "VEC4"},
+    samplers=_CANDIDATES,
+    uniforms={"voxel_grid": VOXEL_GRID},
+    structs=(TILE, LIGHT, MAP_FACE),
+    constants={**_CANDIDATE_CONSTANTS, "pc_rounds": "INT", "pc_origin": "IVEC2"},
+    defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES),
+)
+
+CACHE_EMIT = Shader(
+    name="vpl_cache_emit",
+    fragment="vpl/vpl_cache_emit_frag.glsl",
+    outputs={"out_flux": "VEC4"},
+    samplers={"sum_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D", "reflectance_tx": "FLOAT_2D"},
+    constants={"pc_origin": "IVEC2"},
+)
+
+INDEX_SCATTER = Shader(
+    name="vpl_index_scatter",
+    vertex="vpl/vpl_index_scatter_vert.glsl",
+    fragment="vpl/vpl_index_scatter_frag.glsl",
+    varyings={"v_point": "flat INT"},
+    outputs={"out_point": "VEC4"},
+    samplers=ATLAS_SAMPLERS,
+    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT"},
+    defines=_INDEX,
+)
+
+INDEX_SPREAD = Shader(
+    name="vpl_index_spread",
+    fragment="vpl/vpl_index_spread_frag.glsl",
+    outputs={"out_point": "VEC4"},
+    samplers={"index_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D"},
+    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT"},
+    defines=_INDEX,
+)
+
+SHADERS = (INDEX_SCATTER, INDEX_SPREAD, CACHE_FADE, CACHE_GATHER, CACHE_EMIT, SKY, LUMINANCE, REDUCE, TILES, POOL, GATHER, UPSAMPLE)

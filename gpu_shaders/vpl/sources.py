@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 # Texels along a tile's side are a multiple of this, so that no block of the pyramid straddles two tiles.
 TILE_STEP = 16
 # The sky's patches lie so many times farther than the scene is large: beyond the parallax that a float could show.
+# Of what they send, a sphere around the scene receives 1 / (4 SKY_DISTANCE^2): their strength when lights are chosen.
 SKY_DISTANCE = 1e3
 # Points along a side of the square that emitters, and the cache, have in their tile.
 POINTS_SIDE = 64
@@ -115,6 +116,7 @@ class Sources(ReflectiveShadowMaps):
                 viewport=viewport,
                 pc_sphere=_sky_sphere(gpu_scene.boxes),
                 pc_radiance=gpu_scene.scene.world.color,
+                pc_counts=0.25 / SKY_DISTANCE**2,
                 pc_viewport=viewport,
             )
             return

@@ -6,11 +6,22 @@
 #include "frame/light_map_lib.glsl"
 #include "frame/voxel_lib.glsl"
 #include "lib/sampling_lib.glsl"
+#include "vpl/vpl_index_lib.glsl"
 #include "vpl/vpl_lib.glsl"
 
 /* A texel answers for a ray's hit that lies no farther away than so many voxels and so many of its own widths. */
 const float CANDIDATES_VOXELS = 2.0;
 const float CANDIDATES_TEXELS = 1.5;
+/* A point on an emitter answers for hits up to so many cells of the index away. */
+const float CANDIDATES_CELLS = 1.0;
+/* A point of the cache answers for hits that lie so many cells off its plane. */
+const float CANDIDATES_OFF_PLANE = 0.5;
+
+/* Strength of all sources. */
+float candidates_total()
+{
+  return texelFetch(sums_tx, ivec2(pc_tiles - 1, 0), 0).y;
+}
 
 /* Two unit vectors that make a frame with n (Duff et al. 2017). */
 void candidates_frame(vec3 n, out vec3 x, out vec3 y)
@@ -33,7 +44,7 @@ vec3 candidates_cosine_direction(vec3 n, vec2 noise)
 }
 
 /* One of the lights, in proportion to what its tiles send: index of one of its tiles, or -1; `share` its part. */
-int candidates_light(float u, out float share)
+int candidates_lamp(float u, out float share)
 {
   share = 0.0;
   float lights = pc_light_tiles > 0 ? texelFetch(sums_tx, ivec2(pc_light_tiles - 1, 0), 0).z : 0.0;
@@ -58,12 +69,11 @@ int candidates_light(float u, out float share)
  * reach it. */
 Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
 {
-  Vpl none = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), 0);
   Light light = light_fetch(light_tx, int(vpl_tile_fetch(tile_tx, tile_index).light));
   MapFace face = map_face_fetch(face_tx, light_map_face(light, face_tx, hit));
   vec3 p = map_position(face, hit);
   if (!map_holds(face, p)) {
-    return none;
+    return VPL_NONE;
   }
   ivec2 texel = ivec2(face.origin + floor(map_uv(face, p) * face.tile));
   vec4 place = texelFetch(position_area_tx, texel, 0);
@@ -71,9 +81,9 @@ Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
   vec3 apart = place.xyz - hit;
   float near = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_TEXELS * sqrt(place.w);
   if (normal_kind.w == 0.0 || dot(apart, apart) > near * near || dot(normal_kind.xyz, direction) >= 0.0) {
-    return none;
+    return VPL_NONE;
   }
-  return Vpl(place.xyz, place.w, normal_kind.xyz, texelFetch(flux_tx, texel, 0).rgb, vpl_id(texel, VPL_BOUNCE));
+  return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, vpl_id(texel, SOURCE_BOUNCE));
 }
 
 /* The patch of sky in this direction. */
@@ -81,42 +91,118 @@ Vpl candidates_sky(vec3 direction)
 {
   vec4 place = pc_sky; /* origin, side of its tile */
   ivec2 texel = ivec2(place.xy + min(floor((0.5 + 0.5 * octahedron_encode(direction)) * place.z), place.z - 1.0));
-  int id = vpl_id(texel, VPL_SKY);
+  int id = vpl_id(texel, SOURCE_SKY);
   return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, id);
 }
 
-/* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. */
-Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int count, out bool visible)
+/* Radiance that the cache holds for what a ray along `direction` hit at `hit`: that of the point whose plane the hit lies
+ * on best, out of one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered,
+ * so that over many rays the cells' values blend; a second try takes the hit's own. */
+vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
+{
+  for (int attempt = 0; attempt < 2 && pc_cache.z > 0.0; attempt++) {
+    vec3 place = index_place(hit) + (attempt == 0 ? noise - 0.5 : vec3(0.0));
+    float nearest = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_OFF_PLANE / pc_index.w;
+    ivec2 found = ivec2(-1);
+    for (int axis = 0; axis < 3; axis++) {
+      int point = index_point(cache_index_tx, place, index_side(axis, -direction[axis]));
+      if (point < 0) {
+        continue;
+      }
+      ivec2 texel = index_atlas_texel(pc_cache, point);
+      vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
+      float off = abs(dot(texelFetch(position_area_tx, texel, 0).xyz - hit, n));
+      if (dot(n, direction) < 0.0 && off < nearest) {
+        nearest = off;
+        found = texel;
+      }
+    }
+    if (found.x >= 0) {
+      vec3 n = texelFetch(normal_kind_tx, found, 0).xyz;
+      vec3 before = hit - 2.0 * voxel_grid.edge * direction;
+      if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, found, 0).xyz, n))) {
+        return index_radiance(position_area_tx, flux_tx, found);
+      }
+    }
+  }
+  return vec3(0.0);
+}
+
+/* Irradiance / pi from the emitter that a ray from P along `direction` hit at `hit`, weighted against what the pool finds
+ * of it by the balance heuristic. */
+vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
+{
+  vec3 place = index_place(hit);
+  for (int axis = 0; axis < 3 && pc_emitters.z > 0.0; axis++) {
+    int point = index_point(emitter_index_tx, place, index_side(axis, -direction[axis]));
+    if (point < 0) {
+      continue;
+    }
+    ivec2 texel = index_atlas_texel(pc_emitters, point);
+    vec4 lamp = texelFetch(position_area_tx, texel, 0);
+    vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
+    vec3 apart = hit - lamp.xyz;
+    float cosine = -dot(n, direction);
+    /* The hit must lie on the point's plane, and no farther from it than the cell around it reaches. */
+    if (cosine <= 0.0 || abs(dot(apart, n)) > CANDIDATES_VOXELS * voxel_grid.edge ||
+        dot(apart, apart) * pc_index.w * pc_index.w > CANDIDATES_CELLS * CANDIDATES_CELLS) {
+      continue;
+    }
+    vec3 flux = texelFetch(flux_tx, texel, 0).rgb;
+    vec3 to_hit = hit - P;
+    float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
+    float by_pool = float(pc_candidates) * vpl_strength(flux) / (candidates_total() * lamp.w);
+    return flux / (MATH_PI * lamp.w) * (by_ray / (by_ray + by_pool));
+  }
+  return vec3(0.0);
+}
+
+/* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. `carried` and
+ * `emitted` are one ray's estimates of the irradiance / pi from the cache, and of the part of that from emitters. Receivers and their
+ * rounds, of the same sample, differ in `pixel` or in `round`. */
+Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int round, out bool visible,
+                            out vec3 carried, out vec3 emitted)
 {
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
   visible = false;
-  vec2 start = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed));
+  carried = vec3(0.0);
+  emitted = vec3(0.0);
+  int count = pc_candidates;
+  int seed = pc_seed + 4 * round;
+  vec2 start = sampling_r2(pc_sample, sampling_hash(pixel, seed));
   float u = start.y;
   float stratum = float(pc_pool) / float(count);
   float candidates = float(count);
   for (int i = 0; i < count; i++) {
     int entry = min(int((float(i) + start.x) * stratum), pc_pool - 1);
     ivec2 at = ivec2(entry % VPL_POOL_ROW, entry / VPL_POOL_ROW);
+    vec4 facing = texelFetch(pool_normal_tx, at, 0);
+    int id = floatBitsToInt(facing.w);
+    if ((pc_kinds >> vpl_id_kind(id) & 1) == 0) {
+      continue;
+    }
     vec4 flux = texelFetch(pool_flux_tx, at, 0);
     vec4 place = texelFetch(pool_position_tx, at, 0);
-    vec4 facing = texelFetch(pool_normal_tx, at, 0);
     float form = vpl_form(place.xyz, place.w, octahedron_decode(facing.xy), P, N);
     float target = vpl_strength(flux.rgb) * form;
     float by_ray = facing.z * place.w * form * (1.0 / MATH_PI);
-    reservoir_offer(r, floatBitsToInt(facing.w), target / max(candidates * flux.w + by_ray, 1e-30), target, u);
+    reservoir_offer(r, id, target / max(candidates * flux.w + by_ray, 1e-30), target, u);
   }
-  vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 1));
+  vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, seed + 1));
   vec3 direction = candidates_cosine_direction(N, noise);
   if (dot(direction, geometric) > 0.0) {
     vec3 origin = voxel_start(P, geometric);
     float far = voxel_trace(origin, direction, 1e30);
     float share = 1.0;
-    Vpl seen = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), 0);
+    Vpl seen = VPL_NONE;
     if (far >= 0.0) {
-      vec2 choice = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2));
-      int tile = candidates_light(choice.x, share);
+      vec2 choice = sampling_r2(pc_sample, sampling_hash(pixel, seed + 2));
+      vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
+      emitted = candidates_emitted(P, N, hit, direction);
+      carried = candidates_carried(hit, direction, vec3(sampling_hash(pixel, seed + 3), choice.y));
+      int tile = (pc_kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
-        seen = candidates_seen(origin + (far + 0.5 * voxel_grid.edge) * direction, direction, tile);
+        seen = candidates_seen(hit, direction, tile);
       }
     } else if (pc_sky.z > 0.0) {
       seen = candidates_sky(direction);
@@ -124,8 +210,7 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int cou
     float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
     float target = vpl_strength(seen.flux) * form;
     if (seen.id != 0 && target > 0.0) {
-      float total = texelFetch(sums_tx, ivec2(pc_tiles - 1, 0), 0).y;
-      float by_pool = candidates * vpl_strength(seen.flux) / total;
+      float by_pool = candidates * seen.counts * vpl_strength(seen.flux) / candidates_total();
       float by_ray = share * seen.area * form * (1.0 / MATH_PI);
       int before = r.id;
       float sum = r.sum;
@@ -135,4 +220,27 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int cou
   }
   r.seen = 1.0;
   return r;
+}
+
+/* No surface receives more irradiance / pi than the radiance of what shines on it. One light that stands for many may
+ * give pc_bound times that, 0 for no bound: beside an emitter, which rays do not find, its noise would be without end. */
+vec3 candidates_bounded(Vpl vpl, vec3 light)
+{
+  float most = pc_bound * vpl_strength(vpl.flux) / (MATH_PI * vpl.area);
+  float strength = vpl_strength(light);
+  return pc_bound > 0.0 && strength > most ? light * (most / strength) : light;
+}
+
+/* The chosen light's irradiance / pi, if it is seen. */
+vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric)
+{
+  if (r.id == 0) {
+    return vec3(0.0);
+  }
+  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
+  if (!visible && pc_occluded != 0 && !voxel_visible(P, geometric, vpl.position, vpl.normal)) {
+    return vec3(0.0);
+  }
+  vec3 light = vpl_light(vpl, P, N) * (r.sum / r.target);
+  return vpl_id_kind(r.id) == SOURCE_EMISSION ? candidates_bounded(vpl, light) : light;
 }

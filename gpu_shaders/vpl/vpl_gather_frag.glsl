@@ -16,19 +16,16 @@ void main()
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
   bool visible;
-  Reservoir r = candidates_choose(P, N, geometric, pixel, pc_candidates, visible);
-  if (r.id == 0) {
-    return;
-  }
-  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
-  if (!visible && pc_occluded != 0 && !voxel_visible(P, geometric, vpl.position, vpl.normal)) {
-    return;
-  }
-  vec3 light = vpl_light(vpl, P, N) * (r.sum / r.target);
+  vec3 carried;
+  vec3 emitted;
+  Reservoir r = candidates_choose(P, N, geometric, pixel, 0, visible, carried, emitted);
+  vec4 light = vec4(candidates_light(r, visible, P, N, geometric), 1.0);
   int kind = vpl_id_kind(r.id);
-  if (kind == VPL_EMISSION || kind == VPL_SKY) {
-    out_direct = vec4(light, 1.0);
+  if (kind == SOURCE_EMISSION || kind == SOURCE_SKY) {
+    out_direct = light;
   } else {
-    out_indirect = vec4(light, 1.0);
+    out_indirect = light;
   }
+  out_indirect.rgb += carried;
+  out_direct.rgb += emitted;
 }

@@ -1,6 +1,6 @@
 /* A virtual point light (Keller, "Instant Radiosity", 1997), and reservoirs of them (Bitterli et al. 2020, "Spatiotemporal
- * reservoir resampling for real-time ray tracing with dynamic direct lighting"). VPL_BOUNCE ... VPL_SKY, what a light
- * stands for, are defines (vpl/structs.py). */
+ * reservoir resampling for real-time ray tracing with dynamic direct lighting"). SOURCE_BOUNCE ... SOURCE_SKY, what a light
+ * stands for, are defines (frame/reflective_shaders.py). */
 #include "lib/math_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 #include "vpl/vpl_strength_lib.glsl"
@@ -10,8 +10,11 @@ struct Vpl {
   float area; /* m² that it stands for */
   vec3 normal;
   vec3 flux; /* W, that leaves it diffusely */
+  float counts; /* how much of it counts where lights are chosen by strength */
   int id;    /* its texel in the atlas and its kind; 0: none */
 };
+
+const Vpl VPL_NONE = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), 0.0, 0);
 
 /* Texels of the atlas are below 8192. Kinds are below 31, so that no id is a NaN's bits. */
 int vpl_id(ivec2 texel, int kind)
@@ -33,7 +36,8 @@ Vpl vpl_of_texel(sampler2D position_area_tx, sampler2D normal_kind_tx, sampler2D
 {
   ivec2 texel = vpl_id_texel(id);
   vec4 place = texelFetch(position_area_tx, texel, 0);
-  return Vpl(place.xyz, place.w, texelFetch(normal_kind_tx, texel, 0).xyz, texelFetch(flux_tx, texel, 0).rgb, id);
+  vec4 flux = texelFetch(flux_tx, texel, 0);
+  return Vpl(place.xyz, place.w, texelFetch(normal_kind_tx, texel, 0).xyz, flux.rgb, flux.w, id);
 }
 
 /* Both cosines over the squared distance, 1/m². d^2 + A / pi in place of d^2 is exact on the axis of a disc of the

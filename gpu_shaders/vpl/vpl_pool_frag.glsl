@@ -100,7 +100,7 @@ void main()
   vec4 position_area = texelFetch(position_area_tx, cell, 0);
   vec4 normal_kind = texelFetch(normal_kind_tx, cell, 0);
   float lights = texelFetch(sums_tx, ivec2(max(pc_light_tiles - 1, 0), 0), 0).z;
-  float share = normal_kind.w == float(VPL_BOUNCE) ? sums.w / lights : (normal_kind.w == float(VPL_SKY) ? 1.0 : 0.0);
+  float share = normal_kind.w == float(SOURCE_BOUNCE) ? sums.w / lights : 1.0;
   out_position = position_area;
   out_normal = vec4(octahedron_encode(normal_kind.xyz), share, intBitsToFloat(vpl_id(cell, int(normal_kind.w))));
   out_flux = vec4(texelFetch(flux_tx, cell, 0).rgb, probability);

@@ -12,7 +12,7 @@ void main()
   float omega = 4.0 / (pc_viewport.z * pc_viewport.w * scale * scale * scale);
   float area = omega * pc_sphere.w * pc_sphere.w;
   out_position_area = vec4(pc_sphere.xyz + pc_sphere.w * direction, area);
-  out_normal = vec4(-direction, float(VPL_SKY));
-  out_flux = vec4(MATH_PI * area * pc_radiance.rgb, 0.0);
+  out_normal = vec4(-direction, float(SOURCE_SKY));
+  out_flux = vec4(MATH_PI * area * pc_radiance.rgb, pc_counts);
   out_specular = vec4(0.0);
 }

@@ -8,5 +8,6 @@ float vpl_strength(vec3 light)
 
 float vpl_texel_strength(sampler2D flux_tx, sampler2D specular_tx, ivec2 texel)
 {
-  return vpl_strength(texelFetch(flux_tx, texel, 0).rgb) + vpl_strength(texelFetch(specular_tx, texel, 0).rgb);
+  vec4 flux = texelFetch(flux_tx, texel, 0);
+  return flux.w * (vpl_strength(flux.rgb) + vpl_strength(texelFetch(specular_tx, texel, 0).rgb));
 }

@@ -1,0 +1,39 @@
+/* Which point of the cache lies near: a cube of VPL_INDEX cells along a side around the scene, six sides of each cell for
+ * the ways that surfaces face. pc_index holds the cube's lower corner and cells a metre. A flat texture has the six
+ * sides side by side, and the cells' layers one above the other. */
+
+const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX * VPL_INDEX);
+
+/* In cells. */
+vec3 index_place(vec3 P)
+{
+  return (P - pc_index.xyz) * pc_index.w;
+}
+
+int index_side(int axis, float toward)
+{
+  return 2 * axis + (toward < 0.0 ? 1 : 0);
+}
+
+ivec2 index_texel(ivec3 cell, int side)
+{
+  return ivec2(cell.x + VPL_INDEX * side, cell.y + VPL_INDEX * cell.z);
+}
+
+/* The point that cell and side of `place` hold, or -1. */
+int index_point(sampler2D index_tx, vec3 place, int side)
+{
+  ivec3 cell = clamp(ivec3(floor(place)), ivec3(0), ivec3(VPL_INDEX - 1));
+  return int(texelFetch(index_tx, index_texel(cell, side), 0).x) - 1;
+}
+
+/* Texel of a point of the tile whose lower left texel and side are `tile`. */
+ivec2 index_atlas_texel(vec3 tile, int point)
+{
+  return ivec2(tile.xy) + ivec2(point % int(tile.z), point / int(tile.z));
+}
+
+vec3 index_radiance(sampler2D position_area_tx, sampler2D flux_tx, ivec2 texel)
+{
+  return texelFetch(flux_tx, texel, 0).rgb / (3.14159265358979 * texelFetch(position_area_tx, texel, 0).w);
+}

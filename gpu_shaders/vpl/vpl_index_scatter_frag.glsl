@@ -1,0 +1,4 @@
+void main()
+{
+  out_point = vec4(float(v_point));
+}

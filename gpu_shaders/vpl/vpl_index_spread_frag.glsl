@@ -1,0 +1,33 @@
+/* Fill empty cells of the index from those around: with the point that lies nearest to the cell's centre. */
+#include "vpl/vpl_index_lib.glsl"
+
+void main()
+{
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  out_point = texelFetch(index_tx, texel, 0);
+  if (out_point.x != 0.0) {
+    return;
+  }
+  int side = texel.x / VPL_INDEX;
+  ivec3 cell = ivec3(texel.x - side * VPL_INDEX, texel.y % VPL_INDEX, texel.y / VPL_INDEX);
+  float nearest = 1e30;
+  for (int i = 0; i < 6; i++) {
+    ivec3 other = cell;
+    other[i >> 1] += (i & 1) * 2 - 1;
+    if (any(lessThan(other, ivec3(0))) || any(greaterThanEqual(other, ivec3(VPL_INDEX)))) {
+      continue;
+    }
+    float point = texelFetch(index_tx, index_texel(other, side), 0).x;
+    if (point == 0.0) {
+      continue;
+    }
+    int index = int(point) - 1;
+    vec3 P = texelFetch(position_area_tx, pc_origin + ivec2(index % pc_side, index / pc_side), 0).xyz;
+    vec3 apart = index_place(P) - (vec3(cell) + 0.5);
+    float squared = dot(apart, apart);
+    if (squared < nearest) {
+      nearest = squared;
+      out_point = vec4(point);
+    }
+  }
+}
