@@ -62,8 +62,8 @@ class _FinalRender:
             self.session.sync(self.depsgraph, for_viewport=False, on_main_thread=self._on_main_thread)
             if not self.engine.is_preview:  # whose scene is Blender's, not the user's
                 self._announce()
-            view = _view(self.engine, self.depsgraph)
-            picture = self._gpu(lambda: self.session.picture(view, self.settings))
+            view, wanted = _view(self.engine, self.depsgraph), [p.key for p in self.passes]
+            picture = self._gpu(lambda: self.session.picture(view, self.settings, wanted))
             with _open_result(self.engine, self.depsgraph, view) as result:
                 self._accumulate(picture, result)
                 self._finish(picture, result)

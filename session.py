@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -140,9 +140,10 @@ class Session:
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
         self.status.error = ""
 
-    def picture(self, view: View, settings: Settings) -> Picture:
+    def picture(self, view: View, settings: Settings, passes: Sequence[str]) -> Picture:
         """Bring the GPU up to date; the last picture if scene, view and settings are still the same, else an empty one.
 
+        ``passes`` are the keys of those that can be read of it; a session always asks for the same.
         Raises DeviceError without a usable GPU and RenderError for a picture that the GPU cannot hold.
         """
         gpu = self._ready()
@@ -150,11 +151,11 @@ class Session:
         old = self._picture
         if old and not changed and old.is_for(view, settings):
             return old
-        frame = self._empty_frame(gpu, view, settings)
+        frame = self._empty_frame(gpu, view, passes)
         self._picture = Picture(gpu.device, gpu.scene, gpu.renderer, frame, view, settings, self.status)
         return self._picture
 
-    def _empty_frame(self, gpu: _Gpu, view: View, settings: Settings) -> Frame:
+    def _empty_frame(self, gpu: _Gpu, view: View, passes: Sequence[str]) -> Frame:
         """The last picture's frame, emptied, if it has the right size; else a new one."""
         old, self._picture = self._picture, None
         if old and (old.frame.width, old.frame.height) == (view.width, view.height):
@@ -162,7 +163,7 @@ class Session:
             return old.frame
         if old:
             old.free()
-        return gpu.renderer.begin(view)
+        return gpu.renderer.begin(view, passes)
 
     def rsm_buffers(self, settings: Settings) -> list[RsmBuffers]:
         """Every light's reflective shadow map, for the scene of the last sync."""

@@ -14,6 +14,7 @@ from .settings import Settings
 
 # Seconds of work between two redraws once there is a picture; navigation waits no longer than this.
 SECONDS_PER_DRAW = 0.1
+SHOWN = ("combined",)  # the passes of a viewport
 TEXT_SIZE = 14  # pixels
 TEXT_COLOR = (1.0, 0.3, 0.1, 1.0)
 
@@ -45,7 +46,7 @@ class Viewport:
         if not self._synced or attempt == self._failed_for:
             return
         self._failed_for = attempt  # until it went well
-        picture, wanted = self.session.picture(view, settings), int(settings["samples"])
+        picture, wanted = self.session.picture(view, settings, SHOWN), int(settings["samples"])
         if picture.samples < wanted:
             picture.advance(SECONDS_PER_DRAW)
         picture.show()

@@ -16,8 +16,10 @@ from rebound.tests.support.engine_build import HEIGHT, WIDTH, channels, picture,
 __all__ = ["rebound_scene"]
 
 
-OLD_NAMES = ["Combined", "Depth", "Normal", "Position", "DiffDir", "DiffInd", "DiffCol", "Emit", "Env"]
+OLD_NAMES = ["Combined", "Depth", "Normal", "Position", "DiffDir", "DiffInd", "DiffCol"]
+OLD_NAMES += ["GlossDir", "GlossInd", "GlossCol", "Emit", "Env"]
 NEW_NAMES = ["Combined", "Depth", "Normal", "Position", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color"]
+NEW_NAMES += ["Glossy Direct", "Glossy Indirect", "Glossy Color"]
 NAMES = OLD_NAMES if bpy.app.version < (5, 0) else [*NEW_NAMES, "Emission", "Environment"]
 
 
@@ -66,7 +68,9 @@ def test_every_pass_is_filled(rebound_scene, tmp_path):
         return np.stack([found[f"ViewLayer.{name}.{c}"] for c in "RGB"], axis=-1)
 
     light = rgb("diffuse_direct") + rgb("diffuse_indirect")
-    sum_of_passes = rgb("diffuse_color") * light + rgb("emission") + rgb("environment")
+    glossy = rgb("glossy_direct") + rgb("glossy_indirect")
+    sum_of_passes = rgb("diffuse_color") * light + rgb("glossy_color") * glossy
+    sum_of_passes += rgb("emission") + rgb("environment")
     # The passes and Combined are read from sums of their own; what is left is their rounding.
     np.testing.assert_allclose(sum_of_passes, picture(found)[..., :3], atol=1e-4, rtol=1e-4)
     assert light.max() > 0.1 and rgb("diffuse_indirect").max() > 1e-3

@@ -120,10 +120,14 @@ def test_method_none_runs_no_technique(headless_device):
     studio.free()
 
 
-def test_passes_add_up_to_combined(studio):
-    found = studio.render(SCENE, VIEWS["37 x 3"], 4, ALL)
-    light_of = found["diffuse_direct"] + found["diffuse_indirect"]
-    total = light_of * found["diffuse_color"] + found["emission"] + found["environment"]
+@pytest.mark.parametrize("glossy", [False, True])
+def test_passes_add_up_to_combined(studio, glossy):
+    metal = (Material("Metal", (0.8, 0.5, 0.2), metallic=0.5, specular=(0.04, 0.04, 0.04), roughness=0.3),)
+    found = studio.render(replace(SCENE, materials=metal) if glossy else SCENE, VIEWS["37 x 3"], 4, ALL)
+    total = found["emission"] + found["environment"]
+    for kind in ("diffuse", "glossy"):
+        total += (found[f"{kind}_direct"] + found[f"{kind}_indirect"]) * found[f"{kind}_color"]
+    assert found["glossy_direct"].any() == glossy
     np.testing.assert_allclose(found["combined"][..., :3], total, rtol=1e-5, atol=1e-6)
 
 
