@@ -23,6 +23,7 @@ from rebound.benchmarks.page import make_page
 from rebound.benchmarks.published import publish
 from rebound.benchmarks.results import FigureSet, Scaling, SceneResult
 from rebound.benchmarks.scaling import measure_scaling
+from rebound.benchmarks.tables import figure_table, scene_tables
 
 STEPS = ("curves", "figures", "scaling", "docs", "report")
 DEFAULT_STEPS = STEPS[:-1]
@@ -43,16 +44,16 @@ def main() -> None:
 
 def _curves(cases: list[Case], plan: Plan, folder: Path, arguments: argparse.Namespace) -> None:
     for case in cases:
-        results.write(folder / f"scene-{case.name}.json", measure_scene(case, plan, folder, _say))
+        result = measure_scene(case, plan, folder, _say)
+        results.write(folder / f"scene-{case.name}.json", result)
+        print("\n".join(table.markdown() for table in scene_tables(result)), flush=True)
 
 
 def _figures(cases: list[Case], plan: Plan, folder: Path, arguments: argparse.Namespace) -> None:
     for case in cases:
         found = measure_figures(case, plan, folder, arguments.quick, _say)
         for figure_set in found:
-            _say(figure_set.title)
-            for figure in figure_set.figures:
-                _say(f"  {figure.name}: {figure.value:.4g} {figure.unit}" if figure.value is not None else figure.name)
+            print(figure_table(figure_set).markdown(), flush=True)
         if found:
             results.write(folder / f"figures-{case.name}.json", found)
 

@@ -22,6 +22,7 @@ from .studio import Method, Studio, methods, seconds
 from .timed_device import TimedDevice, median_passes
 
 Say = Callable[[str], None]
+LONG_SECONDS = 60.0  # a ladder that takes longer is climbed once
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,9 @@ def _rebound(
         studio = Studio(device, settings)
         first = seconds(device, lambda: _first_picture(studio, scene, view))
         studio.free()
-        runs = [_ladder(device, settings, scene, view, plan.rebound) for _ in range(plan.runs)]
+        runs = [_ladder(device, settings, scene, view, plan.rebound)]
+        while len(runs) < plan.runs and runs[0][0][-1] < LONG_SECONDS:
+            runs.append(_ladder(device, settings, scene, view, plan.rebound))
         _, last = runs[-1]
         points = []
         for i, samples in enumerate(plan.rebound):

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import sysconfig
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rebound.benchmarks import scaling
+from rebound.benchmarks import results, scaling
 from rebound.benchmarks.figures import dark_pixels
+from rebound.benchmarks.gpu_report import GpuRun
 from rebound.benchmarks.moving import (
     SHOWN,
     Effort,
@@ -27,6 +33,7 @@ from rebound.gpu_shaders import TECHNIQUES
 from rebound.tests.support.device_contract import compute
 from rebound.tests.support.render_scenes import box, light, perspective, quad, scene
 
+ROOT = Path(__file__).resolve().parents[2]
 SMALL = {"shadow_resolution": 128, "rsm_resolution": 32, "rsm_gathers": 16}
 VIEW = perspective(40, 24)
 
@@ -174,3 +181,43 @@ def test_block_of_the_hall_faces_outside():
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((facing * block.normals[::3]).sum(-1) > 0).all()
     assert ((corners.mean(1) - (0, 0, 0.5)) * facing > -1e-9).all()
+
+
+# --- the script, where there is little else ---------------------------------------------------------------------------
+
+
+def test_bench_gpu_needs_numpy_and_moderngl_only(tmp_path):
+    """As on a machine that was lent for its GPU: no Blender, no Pillow, no link to this folder; from a snapshot."""
+    modules = tmp_path / "modules"
+    modules.mkdir()
+    site = Path(sysconfig.get_paths()["platlib"])
+    for name in ("numpy", "numpy.libs", "moderngl", "_moderngl.py", "glcontext"):
+        if (site / name).exists():
+            (modules / name).symlink_to(site / name)
+    save_snapshot(tmp_path / "room.npz", room(), VIEW)
+    script = [
+        ROOT / "benchmarks" / "bench_gpu.py",
+        tmp_path / "room.npz",
+        "--frames",
+        "2",
+        "--out",
+        tmp_path / "gpu.json",
+    ]
+    answer = subprocess.run(
+        [Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}", "-S", *script],
+        env={**os.environ, "PYTHONPATH": str(modules)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    runs = results.read_list(tmp_path / "gpu.json", GpuRun)
+    assert [run.method for run in runs] == [method.label for method in methods()]
+    assert f"device: {runs[0].device}" in answer.stdout
+    for run in runs:
+        assert run.size == (40, 24) and 0 < run.frame < run.first
+        assert run.total(RASTER) > 0
+        assert "frame_gbuffer" in {p.name for p in run.passes}
+        assert run.total(RASTER) + run.total(COMPUTE) + run.total(UPLOAD) == pytest.approx(
+            sum(p.milliseconds for p in run.passes)
+        )

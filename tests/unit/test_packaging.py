@@ -5,6 +5,8 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -49,6 +51,11 @@ def test_wheels_are_the_versions_that_are_tested():
         name, version, _, _, platform = wheel.removesuffix(".whl").split("-")
         if _short(platform) != "x86_64-mac":
             assert version == pins[name], wheel
+
+
+@pytest.mark.parametrize("folder", ["benchmarks", "docs", "examples", "tests", "tools"])
+def test_package_leaves_out_what_only_developers_use(folder):
+    assert f"/{folder}/" in MANIFEST["build"]["paths_exclude_pattern"]
 
 
 def test_tagline_fits_blenders_limits():
