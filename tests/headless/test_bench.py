@@ -30,6 +30,7 @@ from rebound.benchmarks.studio import Method, Studio, methods, picture, resized
 from rebound.benchmarks.timed_device import COMPUTE, RASTER, UPLOAD, QueryClock, TimedDevice, WallClock, median_passes
 from rebound.device import Image
 from rebound.gpu_shaders import TECHNIQUES
+from rebound.scene.snapshot import save_snapshot
 from rebound.tests.support.device_contract import compute
 from rebound.tests.support.render_scenes import box, light, perspective, quad, scene
 
