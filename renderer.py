@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -246,14 +247,17 @@ class Renderer:
         gbuffer, scene = frame.gbuffer, inputs.gpu_scene.scene
         light = {name: getattr(frame.light, name).colors[0] for name in LIGHTS}
         pictures = {**light, **{name: getattr(gbuffer, name) for name in ("albedo", "emission", "position", "normal")}}
-        given = {f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))}
+        given: dict[str, Any] = {
+            f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))
+        }
         given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
         given["pc_eye"] = inputs.eye
         state = ADD if frame.samples else DrawState()
         for sums, target in frame.sum_targets.items():
             shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect)
             wanted = (*shader.samplers, *shader.constants)
-            self.device.fullscreen(shader, target, state=state, **{name: given[name] for name in wanted})
+            resources = {name: given[name] for name in wanted}
+            self.device.fullscreen(shader, target, state=state, **resources)
         if frame.samples == 0 and frame.geometry_target is not None:
             self.device.fullscreen(
                 GEOMETRY,

@@ -129,7 +129,7 @@ def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool) -> Shader:
     defines = [f"WANT_{name.upper()}" for name in sums]
     defines += [name for name, wanted in (("GLOSSY", glossy), ("INDIRECT", indirect)) if wanted]
     return Shader(
-        name="_".join(["frame_accumulate", *(d.lower() for d in defines if "_" not in d), sums[0]]),
+        name="_".join(["frame_accumulate", *(d.lower() for d in defines if "_" not in d), sums[0], str(len(sums))]),
         fragment="frame/frame_accumulate_frag.glsl",
         outputs={f"out_{name}": "VEC4" for name in sums},
         samplers={f"{name}_tx": "FLOAT_2D" for name in samplers},

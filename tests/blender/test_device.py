@@ -104,7 +104,7 @@ def test_no_shader_is_bound_when_the_extension_is_disabled(device, monkeypatch):
 
 @pytest.mark.parametrize("shader", all_shaders(), ids=lambda shader: shader.name)
 def test_declared_shader_compiles(device, shader):
-    assert device._program(shader).shader is shader
+    assert device._program(shader).shader == shader
 
 
 def test_programs_outlive_a_device(device):
