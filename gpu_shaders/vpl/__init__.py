@@ -9,22 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
-from ...device.interface import Device, Target, Texture
-from ..frame.draws import ADD
+from ...device.interface import Device
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import Voxels
 from ..technique import Item, Setting, Value
 from ..frame.reflective_shaders import SourceKind
 from .cache import Cache
+from .gather import Gathering
 from .index import PointIndex
 from .pool import Pool
-from .shaders import GATHER, SHADERS, UPSAMPLE
+from .shaders import SHADERS
 from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
 
 # How far a sample is after each step, for the progress bar.
-MAPS_DONE, VOXELS_DONE, CACHE_DONE, GATHER_DONE = 0.2, 0.4, 0.6, 0.95
+MAPS_DONE, VOXELS_DONE, CACHE_DONE = 0.2, 0.4, 0.6
 # Updates of the cache before the first picture, each of which takes light a bounce further.
 WARM_UP = 12
 # Where light goes on, so many updates of a point after a change are forgotten at once, for they lack light of further
@@ -32,7 +30,6 @@ WARM_UP = 12
 FORGOTTEN, NEWER = 4, 0.5
 ALL_KINDS = sum(1 << kind for kind in SourceKind)
 FIRST_HAND = 1 << SourceKind.EMISSION | 1 << SourceKind.SKY  # light of which the cache's points send the first bounce
-STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}
 
 SETTINGS = (
     Setting(
@@ -122,14 +119,30 @@ SETTINGS = (
         unit="voxels",
     ),
     Setting(
+        "reuse",
+        "BOOL",
+        "Reuse",
+        "Keep what the picture before has found, where it shows the same surfaces. On is calm from the first pictures of a "
+        "moving view, and light lags behind by some pictures; off knows nothing of other pictures",
+        False,
+        viewport_default=True,
+    ),
+    Setting(
+        "denoise",
+        "BOOL",
+        "Denoise",
+        "Smooth the bounced light of neighbouring pixels of one surface as far as its noise goes. On is clean at once; "
+        "off keeps the noise, and the finest detail",
+        False,
+        viewport_default=True,
+    ),
+    Setting(
         "bound",
-        "FLOAT",
+        "BOOL",
         "Bound",
-        "The most that one virtual light of an emissive surface may give, in parts of that surface's radiance. Lower "
-        "has fewer bright dots beside emitters, which it also darkens; 0 sets no bound",
-        4.0,
-        minimum=0.0,
-        maximum=1000.0,
+        "Take a virtual light for a disc of the size that it stands for. Off takes it for a point: contacts are a "
+        "little brighter, and much noisier",
+        True,
     ),
     Setting(
         "occlusion",
@@ -158,7 +171,7 @@ class Vpl:
         self.cache = Cache(device)
         self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
         self._sorted = -1  # revision of the sources that the indices were made for
-        self._coarse: tuple[Texture, Texture, Target] | None = None
+        self.gathering = Gathering(device)
         self._cache_updates = 0.0  # of every point since the scene changed
         self._cache_revision = -1  # of the scene that the cache last gathered in
 
@@ -173,31 +186,9 @@ class Vpl:
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done
         for done in self._fill_pool(inputs, settings):
             yield VOXELS_DONE + (CACHE_DONE - VOXELS_DONE) * done
-        stride = STRIDES[str(settings["scale"])]
-        offset = _grid_offset(inputs, stride)
-        indirect, direct, target = self._coarse_target(inputs, stride)
-        self.device.fullscreen(
-            GATHER,
-            target,
-            position_tx=inputs.gbuffer.position,
-            normal_tx=inputs.gbuffer.normal,
-            **self._candidate_bindings(inputs, settings),
-            pc_kinds=ALL_KINDS,
-            pc_stride=stride,
-            pc_offset=offset,
-        )
-        yield GATHER_DONE
-        for source, full in ((indirect, targets.diffuse_indirect), (direct, targets.diffuse_direct)):
-            self.device.fullscreen(
-                UPSAMPLE,
-                full,
-                state=ADD,
-                position_tx=inputs.gbuffer.position,
-                normal_tx=inputs.gbuffer.normal,
-                coarse_tx=source,
-                pc_stride=stride,
-                pc_offset=offset,
-            )
+        bindings = {**self._candidate_bindings(inputs, settings), "pc_kinds": ALL_KINDS}
+        for done in self.gathering.draw(inputs, settings, bindings, self.sources.revision, targets):
+            yield CACHE_DONE + (1.0 - CACHE_DONE) * done
 
     def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
         """Whether some light's first or further bounces come from the cache."""
@@ -264,9 +255,7 @@ class Vpl:
         self.cache.free()
         for index in self._indices.values():
             index.free()
-        for resource in self._coarse or ():
-            self.device.free(resource)
-        self._coarse = None
+        self.gathering.free()
 
     def _candidate_bindings(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> dict[str, Any]:
         """What vpl_candidates_lib.glsl reads."""
@@ -291,23 +280,8 @@ class Vpl:
             "pc_seed": inputs.noise_seed(2),
             "pc_pool": int(settings["pool"]),
             "pc_candidates": int(settings["candidates"]),
-            "pc_bound": float(settings["bound"]),
+            "pc_bound": float(bool(settings["bound"])),
             "pc_occluded": int(settings["occlusion"]),
             "pc_tiles": len(self.sources.tiles),
             "pc_light_tiles": self.sources.light_tiles,
         }
-
-    def _coarse_target(self, inputs: FrameInputs, stride: int) -> tuple[Texture, Texture, Target]:
-        size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
-        if self._coarse is None or self._coarse[0].size[:2] != size:
-            for old in self._coarse or ():
-                self.device.free(old)
-            textures = self.device.texture(size, "RGBA32F"), self.device.texture(size, "RGBA32F")
-            self._coarse = (*textures, self.device.target(textures))
-        return self._coarse
-
-
-def _grid_offset(inputs: FrameInputs, stride: int) -> tuple[int, int]:
-    """Where the coarse grid begins: another place every sample, so that its pattern averages out."""
-    x, y = np.random.default_rng((inputs.seed, inputs.sample)).integers(0, stride, 2)
-    return int(x), int(y)

@@ -4,7 +4,7 @@ from ...device.shader import Shader
 from ..frame.reflective_shaders import SOURCE_DEFINES
 from ..frame.structs import LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE
 from ..frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS
-from .structs import PYRAMID_STEP, TILE
+from .structs import OLD_VIEW, PYRAMID_STEP, TILE
 
 # Entries of the pool in one row of its textures.
 POOL_ROW = 64
@@ -105,50 +105,65 @@ _CANDIDATE_CONSTANTS = {
     "pc_kinds": "INT",  # bits: the kinds of source that are asked
 }
 
-GATHER = Shader(
-    name="vpl_gather",
-    fragment="vpl/vpl_gather_frag.glsl",
-    outputs={"out_indirect": "VEC4", "out_direct": "VEC4"},
-    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", **_CANDIDATES},
-    uniforms={"voxel_grid": VOXEL_GRID},
-    structs=(TILE, LIGHT, MAP_FACE),
-    constants={**_CANDIDATE_CONSTANTS, "pc_stride": "INT", "pc_offset": "IVEC2"},
-    defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES),
+_LIGHTS = (*LIGHT_DEFINES, *MAP_DEFINES)
+
+
+def _gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+    return Shader(
+        name=name,
+        fragment="vpl/vpl_gather_frag.glsl",
+        outputs={"out_surface": "VEC4", "out_indirect": "VEC4", "out_direct": "VEC4"},
+        samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", **_CANDIDATES},
+        uniforms={"voxel_grid": VOXEL_GRID},
+        structs=(TILE, LIGHT, MAP_FACE),
+        constants={**_CANDIDATE_CONSTANTS, "pc_stride": "INT", "pc_offset": "IVEC2"},
+        defines=(*_DEFINES, *_LIGHTS, *defines),
+    )
+
+
+GATHER = _gather("vpl_gather", ())
+GATHER_TO_REUSE = _gather("vpl_gather_to_reuse", (("REUSE", "1"),))
+
+REUSE = Shader(
+    name="vpl_reuse",
+    fragment="vpl/vpl_reuse_frag.glsl",
+    outputs={"out_reservoir": "VEC4", "out_history": "VEC4", "out_noisy": "VEC4"},
+    samplers={
+        **ATLAS_SAMPLERS,
+        **VOXEL_SAMPLERS,
+        "surface_tx": "FLOAT_2D",
+        "reservoir_tx": "FLOAT_2D",
+        "rest_tx": "FLOAT_2D",
+        "old_surface_tx": "FLOAT_2D",
+        "old_reservoir_tx": "FLOAT_2D",
+        "history_tx": "FLOAT_2D",
+    },
+    uniforms={"voxel_grid": VOXEL_GRID, "old_view": OLD_VIEW},
+    constants={
+        "pc_sample": "INT",
+        "pc_seed": "INT",
+        "pc_occluded": "INT",
+        "pc_bound": "FLOAT",
+        "pc_most_reuse": "FLOAT",  # samples that an old reservoir may stand for
+        "pc_most_history": "FLOAT",  # samples that the mean before may stand for
+    },
+    defines=_DEFINES,
+)
+
+ATROUS = Shader(
+    name="vpl_atrous",
+    fragment="vpl/vpl_atrous_frag.glsl",
+    outputs={"out_light": "VEC4"},
+    samplers={"surface_tx": "FLOAT_2D", "light_tx": "FLOAT_2D"},
+    constants={"pc_step": "INT"},
 )
 
 UPSAMPLE = Shader(
     name="vpl_upsample",
     fragment="vpl/vpl_upsample_frag.glsl",
     outputs={"out_light": "VEC4"},
-    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "coarse_tx": "FLOAT_2D"},
-    constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
-)
-
-CACHE_FADE = Shader(
-    name="vpl_cache_fade",
-    fragment="vpl/vpl_cache_fade_frag.glsl",
-    outputs={"out_sum": "VEC4"},
-    samplers={"sum_tx": "FLOAT_2D"},
-    constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
-)
-
-CACHE_GATHER = Shader(
-    name="vpl_cache_gather",
-    fragment="vpl/vpl_cache_gather_frag.glsl",
-    outputs={"out_sum": "VEC4"},
-    samplers=_CANDIDATES,
-    uniforms={"voxel_grid": VOXEL_GRID},
-    structs=(TILE, LIGHT, MAP_FACE),
-    constants={**_CANDIDATE_CONSTANTS, "pc_rounds": "INT", "pc_origin": "IVEC2"},
-    defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES),
-)
-
-CACHE_EMIT = Shader(
-    name="vpl_cache_emit",
-    fragment="vpl/vpl_cache_emit_frag.glsl",
-    outputs={"out_flux": "VEC4"},
-    samplers={"sum_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D", "reflectance_tx": "FLOAT_2D"},
-    constants={"pc_origin": "IVEC2"},
+    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "surface_tx": "FLOAT_2D", "light_tx": "FLOAT_2D"},
+    constants={"pc_stride": "FLOAT", "pc_offset": "VEC2"},
 )
 
 INDEX_SCATTER = Shader(
@@ -171,4 +186,31 @@ INDEX_SPREAD = Shader(
     defines=_INDEX,
 )
 
-SHADERS = (INDEX_SCATTER, INDEX_SPREAD, CACHE_FADE, CACHE_GATHER, CACHE_EMIT, SKY, LUMINANCE, REDUCE, TILES, POOL, GATHER, UPSAMPLE)
+CACHE_FADE = Shader(
+    name="vpl_cache_fade",
+    fragment="vpl/vpl_cache_fade_frag.glsl",
+    outputs={"out_sum": "VEC4"},
+    samplers={"sum_tx": "FLOAT_2D"},
+    constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
+)
+
+CACHE_GATHER = Shader(
+    name="vpl_cache_gather",
+    fragment="vpl/vpl_cache_gather_frag.glsl",
+    outputs={"out_sum": "VEC4"},
+    samplers=_CANDIDATES,
+    uniforms={"voxel_grid": VOXEL_GRID},
+    structs=(TILE, LIGHT, MAP_FACE),
+    constants={**_CANDIDATE_CONSTANTS, "pc_rounds": "INT", "pc_origin": "IVEC2"},
+    defines=(*_DEFINES, *_LIGHTS),
+)
+
+CACHE_EMIT = Shader(
+    name="vpl_cache_emit",
+    fragment="vpl/vpl_cache_emit_frag.glsl",
+    outputs={"out_flux": "VEC4"},
+    samplers={"sum_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D", "reflectance_tx": "FLOAT_2D"},
+    constants={"pc_origin": "IVEC2"},
+)
+
+SHADERS = (INDEX_SCATTER, INDEX_SPREAD, CACHE_FADE, CACHE_GATHER, CACHE_EMIT, SKY, LUMINANCE, REDUCE, TILES, POOL, GATHER, GATHER_TO_REUSE, REUSE, ATROUS, UPSAMPLE)

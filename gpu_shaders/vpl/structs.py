@@ -12,3 +12,11 @@ TILE = Struct(
 
 # A cell of one level of the pyramid of strengths has so many children along a side.
 PYRAMID_STEP = 4
+
+OLD_VIEW = Struct(
+    "OldView",
+    clip_from_world="mat4",  # of the picture before
+    size="vec2",  # pixels
+    offset="vec2",  # of its gathering pixels
+    stride="float",
+)

@@ -6,8 +6,8 @@
 #include "frame/light_map_lib.glsl"
 #include "frame/voxel_lib.glsl"
 #include "lib/sampling_lib.glsl"
+#include "vpl/vpl_form_lib.glsl"
 #include "vpl/vpl_index_lib.glsl"
-#include "vpl/vpl_lib.glsl"
 
 /* A texel answers for a ray's hit that lies no farther away than so many voxels and so many of its own widths. */
 const float CANDIDATES_VOXELS = 2.0;
@@ -222,15 +222,6 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int rou
   return r;
 }
 
-/* No surface receives more irradiance / pi than the radiance of what shines on it. One light that stands for many may
- * give pc_bound times that, 0 for no bound: beside an emitter, which rays do not find, its noise would be without end. */
-vec3 candidates_bounded(Vpl vpl, vec3 light)
-{
-  float most = pc_bound * vpl_strength(vpl.flux) / (MATH_PI * vpl.area);
-  float strength = vpl_strength(light);
-  return pc_bound > 0.0 && strength > most ? light * (most / strength) : light;
-}
-
 /* The chosen light's irradiance / pi, if it is seen. */
 vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric)
 {
@@ -241,6 +232,5 @@ vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric)
   if (!visible && pc_occluded != 0 && !voxel_visible(P, geometric, vpl.position, vpl.normal)) {
     return vec3(0.0);
   }
-  vec3 light = vpl_light(vpl, P, N) * (r.sum / r.target);
-  return vpl_id_kind(r.id) == SOURCE_EMISSION ? candidates_bounded(vpl, light) : light;
+  return vpl_light(vpl, P, N) * (r.sum / r.target);
 }

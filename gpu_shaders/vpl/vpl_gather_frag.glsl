@@ -1,12 +1,13 @@
 /* One sample of a pixel's light from the pool: candidates, the choice of one, and a ray to it. */
 #include "vpl/vpl_candidates_lib.glsl"
+#include "vpl/vpl_surface_lib.glsl"
 
 void main()
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy) * pc_stride + pc_offset;
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * pc_stride + pc_offset, textureSize(position_tx, 0) - 1);
+  out_surface = vec4(0.0);
   out_indirect = vec4(0.0);
   out_direct = vec4(0.0);
-  pixel = min(pixel, textureSize(position_tx, 0) - 1);
   vec4 position = texelFetch(position_tx, pixel, 0);
   if (position.w == 0.0) {
     return;
@@ -19,13 +20,16 @@ void main()
   vec3 carried;
   vec3 emitted;
   Reservoir r = candidates_choose(P, N, geometric, pixel, 0, visible, carried, emitted);
-  vec4 light = vec4(candidates_light(r, visible, P, N, geometric), 1.0);
+  vec3 light = candidates_light(r, visible, P, N, geometric);
+  out_surface = surface_pack(P, N);
+#ifdef REUSE
+  bool lit = any(greaterThan(light, vec3(0.0)));
+  out_indirect = vec4(intBitsToFloat(r.id), lit ? r.sum / r.target : 0.0, 1.0, 0.0);
+  out_direct = vec4(carried + emitted, 1.0);
+#else
   int kind = vpl_id_kind(r.id);
-  if (kind == SOURCE_EMISSION || kind == SOURCE_SKY) {
-    out_direct = light;
-  } else {
-    out_indirect = light;
-  }
-  out_indirect.rgb += carried;
-  out_direct.rgb += emitted;
+  bool first_hand = kind == SOURCE_EMISSION || kind == SOURCE_SKY;
+  out_indirect = vec4(carried + (first_hand ? vec3(0.0) : light), 1.0);
+  out_direct = vec4(emitted + (first_hand ? light : vec3(0.0)), 1.0);
+#endif
 }

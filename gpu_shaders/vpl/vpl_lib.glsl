@@ -40,22 +40,6 @@ Vpl vpl_of_texel(sampler2D position_area_tx, sampler2D normal_kind_tx, sampler2D
   return Vpl(place.xyz, place.w, texelFetch(normal_kind_tx, texel, 0).xyz, flux.rgb, flux.w, id);
 }
 
-/* Both cosines over the squared distance, 1/m². d^2 + A / pi in place of d^2 is exact on the axis of a disc of the
- * light's own area A: what touches it stays bounded. */
-float vpl_form(vec3 position, float area, vec3 normal, vec3 P, vec3 N)
-{
-  vec3 d = position - P;
-  float squared = dot(d, d);
-  float cosines = max(dot(N, d), 0.0) * max(-dot(normal, d), 0.0);
-  return cosines / max(squared * (squared + area * (1.0 / MATH_PI)), 1e-30);
-}
-
-/* Irradiance / pi, unoccluded. */
-vec3 vpl_light(Vpl vpl, vec3 P, vec3 N)
-{
-  return vpl.flux * (vpl_form(vpl.position, vpl.area, vpl.normal, P, N) * (1.0 / (MATH_PI * MATH_PI)));
-}
-
 /* One light out of many candidates: `weight` estimates 1 / the probability of `id`, from `seen` candidates. */
 struct Reservoir {
   int id;

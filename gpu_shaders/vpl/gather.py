@@ -1,0 +1,204 @@
+"""Gathering at some of the pixels: candidates, their reuse over space and time, a filter, and the way up to all pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...device.interface import Device, Target, Texture
+from ..frame.draws import ADD
+from ..frame.inputs import FrameInputs, LightTargets
+from ..technique import Value
+from .shaders import ATROUS, GATHER, GATHER_TO_REUSE, REUSE, UPSAMPLE
+from .structs import OLD_VIEW
+
+STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
+# Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
+# the scene did. A still view's mean grows without end.
+LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
+# Samples that an old reservoir may stand for.
+MOST_REUSE = 12.0
+# Distances between the texels that one pass of the filter compares.
+FILTER_STEPS = (1, 2, 4)
+# How far the gathering is after its passes, for the progress bar.
+GATHER_DONE, FILTER_DONE = 0.7, 0.8
+
+
+@dataclass(eq=False)
+class _Grid:
+    """Textures of one grid of gathering pixels. Those in pairs have the newest first."""
+
+    size: tuple[int, int]
+    surfaces: list[Texture]
+    gathered: tuple[Texture, Texture]
+    reservoirs: list[Texture]
+    histories: list[Texture]
+    noisy: list[Texture]
+    gather_targets: list[Target]
+    reuse_targets: list[Target]
+    noisy_targets: list[Target]
+
+    @property
+    def resources(self) -> tuple[Texture | Target, ...]:
+        targets = (*self.gather_targets, *self.reuse_targets, *self.noisy_targets)
+        return (*targets, *self.surfaces, *self.gathered, *self.reservoirs, *self.histories, *self.noisy)
+
+    def turn(self) -> None:
+        """Make what is newest the picture before."""
+        for pair in (self.surfaces, self.gather_targets, self.reservoirs, self.histories, self.reuse_targets):
+            pair.reverse()
+
+
+@dataclass(frozen=True)
+class _Before:
+    """What the picture before was made of."""
+
+    clip_from_world: np.ndarray
+    size: tuple[int, int]
+    offset: tuple[int, int]
+    stride: int
+    scene_revision: int
+    sources_revision: int
+
+    def block(self) -> np.ndarray:
+        row = {
+            "clip_from_world": self.clip_from_world,
+            "size": self.size,
+            "offset": self.offset,
+            "stride": self.stride,
+        }
+        return OLD_VIEW.pack([row], for_uniform=True)
+
+
+class Gathering:
+    """The passes from the pool to the light of every pixel."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._grid: _Grid | None = None
+        self._before: _Before | None = None
+        self._pictures = 0
+
+    def draw(
+        self,
+        inputs: FrameInputs,
+        settings: Mapping[str, Value],
+        candidates: Mapping[str, Any],
+        sources_revision: int,
+        targets: LightTargets,
+    ) -> Iterator[float]:
+        """Add this sample's light to ``targets``; yields progress. ``candidates``: what vpl_candidates_lib.glsl reads."""
+        stride = STRIDES[str(settings["scale"])]
+        offset = self._offset(inputs, stride)
+        grid = self._fitting(inputs, stride)
+        reuses = bool(settings["reuse"])
+        self.device.fullscreen(
+            GATHER_TO_REUSE if reuses else GATHER,
+            grid.gather_targets[0],
+            position_tx=inputs.gbuffer.position,
+            normal_tx=inputs.gbuffer.normal,
+            **candidates,
+            pc_stride=stride,
+            pc_offset=offset,
+        )
+        yield GATHER_DONE
+        size = (inputs.view.width, inputs.view.height)
+        revision = inputs.gpu_scene.revision
+        now = _Before(inputs.clip_from_world, size, offset, stride, revision, sources_revision)
+        if reuses:
+            self._reuse(inputs, grid, candidates, now)
+            light = self._filtered(grid) if settings["denoise"] else grid.noisy[0]
+            self._upsample(inputs, now, grid, light, targets.diffuse_indirect)
+        else:
+            for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
+                self._upsample(inputs, now, grid, light, target)
+        self._before = now if reuses else None
+        self._pictures += 1
+
+    def free(self) -> None:
+        for resource in self._grid.resources if self._grid else ():
+            self.device.free(resource)
+        self._grid = self._before = None
+
+    def _reuse(self, inputs: FrameInputs, grid: _Grid, candidates: Mapping[str, Any], now: _Before) -> None:
+        before = self._before
+        history = reuse = 0.0
+        if before is not None:
+            still = inputs.sample > 0
+            history = ENDLESS if still else LONG_HISTORY if before.scene_revision == now.scene_revision else SHORT_HISTORY
+            # Samples of a still view are to be independent, or their mean would converge more slowly.
+            reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
+        self.device.fullscreen(
+            REUSE,
+            grid.reuse_targets[0],
+            **{name: candidates[name] for name in ("position_area_tx", "normal_kind_tx", "flux_tx")},
+            **{name: candidates[name] for name in ("voxel_tx", "voxel_grid", "pc_occluded", "pc_bound")},
+            surface_tx=grid.surfaces[0],
+            reservoir_tx=grid.gathered[0],
+            rest_tx=grid.gathered[1],
+            old_surface_tx=grid.surfaces[1],
+            old_reservoir_tx=grid.reservoirs[1],
+            history_tx=grid.histories[1],
+            old_view=(before or now).block(),
+            pc_sample=self._pictures,
+            pc_seed=inputs.noise_seed(3),
+            pc_most_reuse=reuse,
+            pc_most_history=history,
+        )
+
+    def _filtered(self, grid: _Grid) -> Texture:
+        newest = 0
+        for step in FILTER_STEPS:
+            light, target = grid.noisy[newest], grid.noisy_targets[1 - newest]
+            self.device.fullscreen(ATROUS, target, surface_tx=grid.surfaces[0], light_tx=light, pc_step=step)
+            newest = 1 - newest
+        return grid.noisy[newest]
+
+    def _upsample(self, inputs: FrameInputs, now: _Before, grid: _Grid, light: Texture, target: Target) -> None:
+        self.device.fullscreen(
+            UPSAMPLE,
+            target,
+            state=ADD,
+            position_tx=inputs.gbuffer.position,
+            normal_tx=inputs.gbuffer.normal,
+            surface_tx=grid.surfaces[0],
+            light_tx=light,
+            pc_stride=float(now.stride),
+            pc_offset=now.offset,
+        )
+
+    def _offset(self, inputs: FrameInputs, stride: int) -> tuple[int, int]:
+        """Which pixels gather: others in every sample and every picture, so that the grid averages out."""
+        x, y = np.random.default_rng((inputs.seed, inputs.sample)).integers(0, stride, 2)
+        return int(x), int(y)
+
+    def _fitting(self, inputs: FrameInputs, stride: int) -> _Grid:
+        """The grid of this picture's size, turned so that the picture before is the older of each pair."""
+        size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
+        if self._grid is None or self._grid.size != size:
+            self.free()
+            self._grid = _new_grid(self.device, size)
+        self._grid.turn()
+        return self._grid
+
+
+def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
+    def pair() -> list[Texture]:
+        return [device.texture(size, "RGBA32F") for _ in range(2)]
+
+    surfaces, gathered, reservoirs, histories, noisy = pair(), tuple(pair()), pair(), pair(), pair()
+    # Reuse writes the first of the noisy pair; the filter goes to and fro between both.
+    return _Grid(
+        size,
+        surfaces,
+        gathered,
+        reservoirs,
+        histories,
+        noisy,
+        [device.target([surface, *gathered]) for surface in surfaces],
+        [device.target([r, h, noisy[0]]) for r, h in zip(reservoirs, histories, strict=True)],
+        [device.target([texture]) for texture in noisy],
+    )

@@ -1,0 +1,136 @@
+/* Spatiotemporal reuse (Bitterli et al. 2020): this sample's reservoir, the one that the surface had in the picture before
+ * and some of its neighbours there become one, weighted by the candidates they stand for on surfaces where the chosen
+ * light shines at all. The result joins the mean of the light that the surface had before. */
+#include "frame/voxel_lib.glsl"
+#include "lib/sampling_lib.glsl"
+#include "vpl/vpl_form_lib.glsl"
+#include "vpl/vpl_surface_lib.glsl"
+
+/* Reservoirs of neighbours that are asked, and from how far, in texels. */
+const int REUSE_NEIGHBOURS = 2;
+const float REUSE_RADIUS = 6.0;
+/* Neighbours less alike than this give nothing. */
+const float REUSE_ALIKE = 0.5;
+/* Means of fewer samples than this do not know their variance. */
+const float REUSE_FEW = 4.0;
+/* Their variance is taken for this, so that only surfaces keep the filter from mixing. */
+const float REUSE_UNKNOWN = 1e12;
+
+struct Source {
+  Gatherer surface;
+  float seen;
+};
+
+void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], int number, Gatherer surface, vec4 stored,
+                 float most, Gatherer at, inout float u)
+{
+  float seen = min(stored.z, most);
+  sources[number] = Source(surface, seen);
+  r.seen += seen;
+  int id = floatBitsToInt(stored.x);
+  if (id == 0 || stored.y <= 0.0) {
+    return;
+  }
+  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, id);
+  float target = vpl_strength(vpl_light(vpl, at.P, at.N));
+  reservoir_offer(r, id, target * stored.y * seen, target, u);
+}
+
+/* The mean of what the four texels around `place` had, of those that show the same surface; w: of how many samples. `moment`
+ * is the mean of the squared strength. */
+vec4 reuse_history(vec2 place, Gatherer at, out float moment)
+{
+  ivec2 lower = ivec2(floor(place));
+  vec2 part = place - vec2(lower);
+  ivec2 size = textureSize(history_tx, 0);
+  vec4 sum = vec4(0.0);
+  float weights = 0.0;
+  moment = 0.0;
+  for (int i = 0; i < 4; i++) {
+    ivec2 corner = ivec2(i & 1, i >> 1);
+    ivec2 texel = lower + corner;
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) {
+      continue;
+    }
+    Gatherer old = surface_unpack(texelFetch(old_surface_tx, texel, 0));
+    vec2 near = mix(1.0 - part, part, vec2(corner)) + 1e-3;
+    float weight = old.exists ? near.x * near.y * surface_alike(at, old) : 0.0;
+    if (weight > 1e-3) {
+      sum += weight * texelFetch(history_tx, texel, 0);
+      moment += weight * texelFetch(old_reservoir_tx, texel, 0).w;
+      weights += weight;
+    }
+  }
+  moment /= max(weights, 1e-3);
+  return weights > 0.02 ? sum / weights : vec4(0.0);
+}
+
+void main()
+{
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  out_reservoir = vec4(0.0);
+  out_history = vec4(0.0);
+  out_noisy = vec4(0.0);
+  Gatherer at = surface_unpack(texelFetch(surface_tx, texel, 0));
+  if (!at.exists) {
+    return;
+  }
+  vec4 clip = old_view.clip_from_world * vec4(at.P, 1.0);
+  vec2 pixel = (0.5 + 0.5 * clip.xy / clip.w) * old_view.size - 0.5;
+  vec2 place = (pixel - old_view.offset) / old_view.stride;
+  bool before = clip.w > 0.0 && pc_most_history > 0.0;
+
+  vec4 own = texelFetch(reservoir_tx, texel, 0);
+  vec2 noise = sampling_r2(pc_sample, sampling_hash(texel, pc_seed));
+  float u = noise.x;
+  Source sources[REUSE_NEIGHBOURS + 2];
+  Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
+  reuse_offer(r, sources, 0, at, own, 1.0, at, u);
+  int count = 1;
+  if (before && pc_most_reuse > 0.0) {
+    for (int i = 0; i <= REUSE_NEIGHBOURS; i++) {
+      float angle = 2.0 * MATH_PI * fract(noise.y + float(i) * 0.618034);
+      float radius = i == 0 ? 0.0 : REUSE_RADIUS * sqrt(fract(noise.x + float(i) * 0.754878));
+      ivec2 from = ivec2(floor(place + 0.5 + radius * vec2(cos(angle), sin(angle))));
+      if (any(lessThan(from, ivec2(0))) || any(greaterThanEqual(from, textureSize(history_tx, 0)))) {
+        continue;
+      }
+      Gatherer old = surface_unpack(texelFetch(old_surface_tx, from, 0));
+      if (old.exists && surface_alike(at, old) > REUSE_ALIKE) {
+        reuse_offer(r, sources, count, old, texelFetch(old_reservoir_tx, from, 0), pc_most_reuse, at, u);
+        count++;
+      }
+    }
+  }
+  vec3 light = texelFetch(rest_tx, texel, 0).rgb;
+  float weight = 0.0;
+  if (r.id != 0) {
+    Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
+    float able = 0.0;
+    for (int i = 0; i < count; i++) {
+      Gatherer s = sources[i].surface;
+      able += vpl_form(vpl.position, vpl.area, vpl.normal, s.P, s.N) > 0.0 ? sources[i].seen : 0.0;
+    }
+    weight = r.sum / max(able * r.target, 1e-30);
+    bool own_choice = r.id == floatBitsToInt(own.x);
+    if (!own_choice && pc_occluded != 0 && !voxel_visible(at.P, at.N, vpl.position, vpl.normal)) {
+      weight = 0.0;
+    }
+    light += vpl_light(vpl, at.P, at.N) * weight;
+  }
+
+  float moment = 0.0;
+  vec4 history = before ? reuse_history(place, at, moment) : vec4(0.0);
+  float samples = min(history.w, pc_most_history) + 1.0;
+  vec3 mean = mix(history.rgb, light, 1.0 / samples);
+  float strength = vpl_strength(light);
+  moment = mix(moment, strength * strength, 1.0 / samples);
+  float level = vpl_strength(mean);
+  float variance = max(moment - level * level, 0.0) / max(samples - 1.0, 1.0);
+  if (samples < REUSE_FEW) {
+    variance = REUSE_UNKNOWN;
+  }
+  out_reservoir = vec4(intBitsToFloat(r.id), weight, r.seen, moment);
+  out_history = vec4(mean, samples);
+  out_noisy = vec4(mean, variance);
+}
