@@ -19,6 +19,7 @@ from .jobs import Job, do
 from .moving import Effort, last_view, measure_ghost, measure_orbit, moved_light, moved_object
 from .pictures import INDIRECT, quantity, read_passes
 from .results import CYCLES, EEVEE, Figure, FigureSet, Pass
+from .score import cells
 from .studio import Method, Studio, methods
 
 Say = Callable[[str], None]
@@ -135,7 +136,8 @@ def _leaks(wanted: np.ndarray, test: np.ndarray, position: np.ndarray) -> list[F
         where = dark_pixels(position, distance)
         mean, truth = float(test[where].mean()), float(wanted[where].mean())
         figures.append(Figure(f"mean bounce, {place}", mean, "radiance", truth, "path traced"))
-        excess = float(np.maximum(test[where] - wanted[where], 0.0).mean())
+        whole = cells(where[..., None].astype(np.float32))[..., 0] == 1.0  # in cells, or noise would count as a leak
+        excess = float(np.maximum(cells(test)[whole] - cells(wanted)[whole], 0.0).mean())
         figures.append(Figure(f"too much of it, {place}", excess, "radiance", truth, "the path-traced mean there"))
     return figures
 
