@@ -259,11 +259,14 @@ class Atlas:
 
     @classmethod
     def fitting(cls, tiles: int, wanted: int, texel_budget: int, largest: int) -> Atlas:
-        """As many tiles of the wanted size; halved until all fit the budget of texels and the largest texture."""
+        """As many tiles of the wanted size; halved until all fit the budget of texels and the largest texture.
+
+        Halves are rounded down to a multiple of 16, so that blocks of so many texels straddle no two tiles.
+        """
         columns = max(1, math.ceil(math.sqrt(tiles)))
         tile = wanted
         while tile > 16 and ((columns * tile) ** 2 > max(texel_budget, wanted**2) or columns * tile > largest):
-            tile //= 2
+            tile = max(tile // 32 * 16, 16)
         return cls(tiles, tile, columns)
 
     @property
