@@ -172,12 +172,15 @@ class Vpl:
         self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
         self._sorted = -1  # revision of the sources that the indices were made for
         self.gathering = Gathering(device)
+        self._picture = 0  # number of the sample in its sequence of noise
         self._cache_updates = 0.0  # of every point since the scene changed
         self._cache_revision = -1  # of the scene that the cache last gathered in
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """See ``Technique.indirect``."""
         gpu_scene = inputs.gpu_scene
+        # Noise goes on from picture to picture where they are averaged, else every picture has the same.
+        self._picture = self._picture + 1 if settings["reuse"] else inputs.sample
         for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache=self._wants_cache(inputs, settings)):
             yield MAPS_DONE * done
         if not self.sources.tiles:
@@ -198,7 +201,7 @@ class Vpl:
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
-        count, seed = int(settings["pool"]), inputs.noise_seed(1) + 64 * inputs.sample
+        count, seed = int(settings["pool"]), inputs.noise_seed(1) + 64 * self._picture
         if self._sorted != self.sources.revision:
             self._sort_points()
             self._sorted = self.sources.revision
@@ -217,7 +220,7 @@ class Vpl:
             self.cache.emit(self.sources, tile)
             self.pool.draw(self.sources, count, seed + number)
             candidates = {**self._candidate_bindings(inputs, settings), "pc_kinds": ALL_KINDS if many else FIRST_HAND}
-            candidates["pc_sample"] = WARM_UP * inputs.sample + number
+            candidates["pc_sample"] = WARM_UP * self._picture + number
             counting = max(self._cache_updates - FORGOTTEN, 0.0) * NEWER if many else self._cache_updates
             self.cache.gather(self.sources, tile, candidates, rows, counting)
             if self._cache_updates < 2 * FORGOTTEN:  # points come to light
@@ -276,7 +279,7 @@ class Vpl:
             "pc_cache": self._points(CACHE),
             "pc_emitters": self._points(EMITTERS),
             "pc_sky": self.sources.viewport(sky) if sky else (0, 0, 0, 0),
-            "pc_sample": inputs.sample,
+            "pc_sample": self._picture,
             "pc_seed": inputs.noise_seed(2),
             "pc_pool": int(settings["pool"]),
             "pc_candidates": int(settings["candidates"]),

@@ -20,7 +20,7 @@ STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one t
 # the scene did. A still view's mean grows without end.
 LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
 # Samples that an old reservoir may stand for.
-MOST_REUSE = 12.0
+MOST_REUSE = 2.0
 # Distances between the texels that one pass of the filter compares.
 FILTER_STEPS = (1, 2, 4)
 # How far the gathering is after its passes, for the progress bar.
@@ -80,7 +80,6 @@ class Gathering:
         self.device = device
         self._grid: _Grid | None = None
         self._before: _Before | None = None
-        self._pictures = 0
 
     def draw(
         self,
@@ -92,7 +91,7 @@ class Gathering:
     ) -> Iterator[float]:
         """Add this sample's light to ``targets``; yields progress. ``candidates``: what vpl_candidates_lib.glsl reads."""
         stride = STRIDES[str(settings["scale"])]
-        offset = self._offset(inputs, stride)
+        offset = _offset(inputs.seed, candidates["pc_sample"], stride)
         grid = self._fitting(inputs, stride)
         reuses = bool(settings["reuse"])
         self.device.fullscreen(
@@ -116,7 +115,6 @@ class Gathering:
             for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
                 self._upsample(inputs, now, grid, light, target)
         self._before = now if reuses else None
-        self._pictures += 1
 
     def free(self) -> None:
         for resource in self._grid.resources if self._grid else ():
@@ -143,7 +141,7 @@ class Gathering:
             old_reservoir_tx=grid.reservoirs[1],
             history_tx=grid.histories[1],
             old_view=(before or now).block(),
-            pc_sample=self._pictures,
+            pc_sample=candidates["pc_sample"],
             pc_seed=inputs.noise_seed(3),
             pc_most_reuse=reuse,
             pc_most_history=history,
@@ -170,11 +168,6 @@ class Gathering:
             pc_offset=now.offset,
         )
 
-    def _offset(self, inputs: FrameInputs, stride: int) -> tuple[int, int]:
-        """Which pixels gather: others in every sample and every picture, so that the grid averages out."""
-        x, y = np.random.default_rng((inputs.seed, inputs.sample)).integers(0, stride, 2)
-        return int(x), int(y)
-
     def _fitting(self, inputs: FrameInputs, stride: int) -> _Grid:
         """The grid of this picture's size, turned so that the picture before is the older of each pair."""
         size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
@@ -183,6 +176,12 @@ class Gathering:
             self._grid = _new_grid(self.device, size)
         self._grid.turn()
         return self._grid
+
+
+def _offset(seed: int, sample: int, stride: int) -> tuple[int, int]:
+    """Which pixels gather: others in every sample, so that the grid averages out."""
+    x, y = np.random.default_rng((seed, sample)).integers(0, stride, 2)
+    return int(x), int(y)
 
 
 def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
