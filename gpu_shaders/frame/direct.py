@@ -1,14 +1,14 @@
-"""Direct light: shadow maps and one full-screen pass over all lights."""
+"""Direct light: shadow maps and one full-screen pass for each light."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...device.interface import Device, DrawState, Target, Texture
+from ...device.interface import Device, DrawState, Target
 from ...scene.data import Light, LightKind, Visibility
 from .draws import ADD, draw_scene, visible_draws
 from .inputs import FrameInputs
@@ -16,35 +16,33 @@ from .light_maps import LightMaps, MapTile
 from .lights import emitter_sample, has_size, light_row
 from .maps import FILTER_OVERLAP, Face, light_faces
 from .shaders import DIRECT, SHADOW
-from .structs import LIGHT
-from .tables import replace_table
+from .structs import LIGHT, MAP_FACE
 
 if TYPE_CHECKING:
     from ...gpu_scene import GpuScene
 
-# Lights in one full-screen pass: a GPU that is busy for seconds in one call is reset by its driver.
-LIGHTS_A_PASS = 16
+# Full-screen passes, each for one light, in one piece of work: a GPU that is busy for seconds is reset by its driver.
+LIGHTS_A_PIECE = 16
 # How far direct light is when the shadow maps are drawn, for the progress bar.
 SHADOWS_DONE = 0.8
 
 
-@dataclass(frozen=True)
-class _Run:
-    """Neighbours in the table of lights that one program shades. ``kind``: the first three keys of DIRECT."""
+@dataclass(frozen=True, eq=False)
+class _Lamp:
+    """One light as its pass takes it: a program, and what does not change from sample to sample with still lights."""
 
-    kind: tuple[LightKind, bool, bool]
-    first: int
-    last: int
+    kind: tuple[LightKind, bool, bool]  # the first three keys of DIRECT
+    light: np.ndarray  # LIGHT and MAP_FACE as uniform blocks
+    face: np.ndarray | None  # None: the table of faces is read instead
 
 
 class DirectLight:
-    """Shadow maps and the light table of one renderer."""
+    """Shadow maps of one renderer, and the lights as its passes take them."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.maps = LightMaps(device, ["RG16F"])
-        self.light_table: Texture | None = None
-        self._runs: tuple[_Run, ...] = ()
+        self._lamps: tuple[_Lamp, ...] = ()
         self._up_to_date: tuple[int, bool, int] | None = None  # scene revision and settings of the last sample
         self._faces_of_still_lights: dict[Hashable, tuple[Face, ...]] = {}
 
@@ -59,21 +57,19 @@ class DirectLight:
         """
         for done in self._update(inputs, filtered, resolution):
             yield SHADOWS_DONE * done
-        if not self._runs:
+        if not self._lamps:
             self.device.clear(target)
-        for run in self._runs:
-            self._shade(inputs, target, run, glossy)
-            yield SHADOWS_DONE + (1.0 - SHADOWS_DONE) * run.last / self._runs[-1].last
+        for index, lamp in enumerate(self._lamps):
+            self._shade(inputs, target, index, lamp, glossy)
+            if index % LIGHTS_A_PIECE == LIGHTS_A_PIECE - 1:
+                yield SHADOWS_DONE + (1.0 - SHADOWS_DONE) * index / len(self._lamps)
 
     def free(self) -> None:
         self.maps.free()
-        if self.light_table is not None:
-            self.device.free(self.light_table)
-            self.light_table = None
-        self._up_to_date = None
+        self._lamps, self._up_to_date = (), None
 
     def _update(self, inputs: FrameInputs, filtered: bool, resolution: int) -> Iterator[float]:
-        """Bring light table and shadow maps up to date for this sample; yields progress 0..1."""
+        """Bring lights and shadow maps up to date for this sample; yields progress 0..1."""
         key = (inputs.gpu_scene.revision, filtered, resolution)
         if key != self._up_to_date:
             self._up_to_date, self._faces_of_still_lights = None, {}
@@ -89,7 +85,7 @@ class DirectLight:
 
     def _lay_out(self, inputs: FrameInputs, filtered: bool, resolution: int) -> None:
         tiles: list[MapTile] = []
-        rows, kinds = [], []
+        rows, only_tiles = [], []
         for index, light in enumerate(inputs.gpu_scene.scene.lights):
             moves = has_size(light) and not filtered
             source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index)) if moves else None
@@ -97,11 +93,17 @@ class DirectLight:
             rows.append(light_row(light, source, len(tiles), len(faces)))
             tiles += [MapTile(light.key, index, face) for face in faces]
             one_face = light.kind in (LightKind.SPOT, LightKind.SUN) and len(faces) == 1
-            kinds.append((light.kind, bool(rows[-1]["filtered"]), one_face))
+            only_tiles.append(tiles[-1] if one_face else None)
         self.maps.lay_out(tiles, resolution)
-        order = sorted(range(len(rows)), key=lambda index: (kinds[index][0].name, *kinds[index][1:]))
-        self._runs = _runs([kinds[index] for index in order])
-        self.light_table = replace_table(self.device, LIGHT.pack([rows[i] for i in order]), self.light_table)
+        packed = LIGHT.pack(rows, for_uniform=True)
+        self._lamps = tuple(
+            _Lamp(
+                (light.kind, bool(row["filtered"]), tile is not None),
+                block,
+                None if tile is None else MAP_FACE.pack([self.maps.face_row(tile)], for_uniform=True)[0],
+            )
+            for light, row, block, tile in zip(inputs.gpu_scene.scene.lights, rows, packed, only_tiles, strict=True)
+        )
 
     def _faces(self, light: Light, boxes: np.ndarray, source: np.ndarray | None) -> tuple[Face, ...]:
         if not light.casts_shadow:
@@ -132,36 +134,23 @@ class DirectLight:
             )
             yield (done + 1) / len(stale)
 
-    def _shade(self, inputs: FrameInputs, target: Target, run: _Run, glossy: bool) -> None:
-        extra = {"specular_tx": inputs.gbuffer.specular, "pc_eye": inputs.eye} if glossy else {}
+    def _shade(self, inputs: FrameInputs, target: Target, index: int, lamp: _Lamp, glossy: bool) -> None:
+        extra: dict[str, Any] = {"face_tx": self.maps.face_table} if lamp.face is None else {"direct_face": lamp.face}
+        if glossy:
+            extra |= {"specular_tx": inputs.gbuffer.specular, "pc_eye": inputs.eye}
         self.device.fullscreen(
-            DIRECT[*run.kind, glossy],
+            DIRECT[*lamp.kind, glossy],
             target,
-            state=ADD if run.first else DrawState(),  # the first covers what was there
+            state=ADD if index else DrawState(),  # the first covers what was there
+            direct_light=lamp.light,
             position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
-            light_tx=self.light_table,
-            face_tx=self.maps.face_table,
             shadow_depth_tx=self.maps.depth,
             shadow_slope_tx=self.maps.colors[0],
-            pc_first_light=run.first,
-            pc_last_light=run.last,
-            pc_seed=inputs.noise_seed(0),
+            pc_seed=inputs.noise_seed(0) + 2 * index,
             pc_sample=inputs.sample,
             **extra,
         )
-
-
-def _runs(kinds: Sequence[tuple[LightKind, bool, bool]]) -> tuple[_Run, ...]:
-    """The passes over a table of lights of these kinds: equal neighbours together, at most LIGHTS_A_PASS."""
-    runs, first = [], 0
-    while first < len(kinds):
-        last = first + 1
-        while last < min(len(kinds), first + LIGHTS_A_PASS) and kinds[last] == kinds[first]:
-            last += 1
-        runs.append(_Run(kinds[first], first, last))
-        first = last
-    return tuple(runs)
 
 
 def _offset(seed: int, light: int) -> np.ndarray:

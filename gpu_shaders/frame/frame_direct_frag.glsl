@@ -25,8 +25,13 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   if (light.face_count == 0) {
     return 1.0;
   }
+#ifdef LIGHT_ONE_FACE
+  int index = light.first_face;
+  MapFace face = direct_face;
+#else
   int index = light_map_face(light, face_tx, P);
   MapFace face = map_face_fetch(face_tx, index);
+#endif
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
   bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;
   vec3 p = map_position(face, P);
@@ -70,41 +75,36 @@ void main()
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
+  Light light = direct_light;
+  /* Known when this is compiled, so that the compiler drops what other lights need. */
+  light.kind = LIGHT_KIND;
+  light.filtered = LIGHT_FILTERED;
+#ifdef LIGHT_ONE_FACE
+  light.face_count = 1;
+#endif
+  vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed));
+  vec3 own_source = light.filtered != 0 ? direct_own_source(light, position.xyz, noise) : light.source;
+  /* The irradiance from a whole point light or sun has a closed form. */
+  bool whole = light.filtered != 0 && light.kind != LIGHT_AREA;
+  vec3 source = whole && light.kind != LIGHT_SPOT ? light.source : own_source;
+  vec3 direction = light.kind == LIGHT_SUN ? source : (whole ? light.position : source) - position.xyz;
+  vec3 diffuse = light_unshadowed(light, position.xyz, N, source);
+  vec3 glossy = vec3(0.0);
 #ifdef GLOSSY
   vec4 specular = texelFetch(specular_tx, pixel, 0);
-  bool mirrors = specular.rgb != vec3(0.0);
-  vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - position.xyz) : pc_eye.xyz;
+  if (specular.rgb != vec3(0.0)) {
+    vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - position.xyz) : pc_eye.xyz;
+    glossy = direct_mirrored(light, position.xyz, N, V, specular, own_source);
+  }
 #endif
-  for (int i = pc_first_light; i < pc_last_light; i++) {
-    Light light = light_fetch(light_tx, i);
-    /* All lights of a pass are of one kind (frame/direct.py), so that the compiler drops what the others need. */
-    light.kind = LIGHT_KIND;
-    light.filtered = LIGHT_FILTERED;
-#ifdef LIGHT_ONE_FACE
-    light.face_count = 1;
-#endif
-    vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2 * i));
-    vec3 own_source = light.filtered != 0 ? direct_own_source(light, position.xyz, noise) : light.source;
-    /* The irradiance from a whole point light or sun has a closed form. */
-    bool whole = light.filtered != 0 && light.kind != LIGHT_AREA;
-    vec3 source = whole && light.kind != LIGHT_SPOT ? light.source : own_source;
-    vec3 direction = light.kind == LIGHT_SUN ? source : (whole ? light.position : source) - position.xyz;
-    vec3 diffuse = light_unshadowed(light, position.xyz, N, source);
-    vec3 glossy = vec3(0.0);
+  /* The upper part of a light whose centre is below the horizon still shines. */
+  float below = whole ? light.emitter_radius : 0.0;
+  if (dot(geometric, direction) > -below && any(greaterThan(diffuse + glossy, vec3(0.0)))) {
+    noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 1));
+    float visible = direct_visibility(light, position.xyz, geometric, noise);
+    out_diffuse.rgb = diffuse * visible;
 #ifdef GLOSSY
-    if (mirrors) {
-      glossy = direct_mirrored(light, position.xyz, N, V, specular, own_source);
-    }
+    out_glossy.rgb = glossy * visible;
 #endif
-    /* The upper part of a light whose centre is below the horizon still shines. */
-    float below = whole ? light.emitter_radius : 0.0;
-    if (dot(geometric, direction) > -below && any(greaterThan(diffuse + glossy, vec3(0.0)))) {
-      noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 2 * i + 1));
-      float visible = direct_visibility(light, position.xyz, geometric, noise);
-      out_diffuse.rgb += diffuse * visible;
-#ifdef GLOSSY
-      out_glossy.rgb += glossy * visible;
-#endif
-    }
   }
 }

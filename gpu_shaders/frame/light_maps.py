@@ -80,8 +80,13 @@ class LightMaps:
         for tile in tiles:
             if tile.key not in self._slots:
                 self._slots[tile.key] = next(free)
-        rows = [face_row(tile.face, self.atlas, self._slots[tile.key]) for tile in tiles]
+        rows = [self.face_row(tile) for tile in tiles]
         self.face_table = replace_table(self.device, MAP_FACE.pack(rows), self.face_table)
+
+    def face_row(self, tile: MapTile) -> dict:
+        """The MAP_FACE row of a tile that has its place."""
+        assert self.atlas is not None
+        return face_row(tile.face, self.atlas, self._slots[tile.key])
 
     def stale(self, gpu_scene: GpuScene) -> list[MapTile]:
         """The tiles that must be drawn again for this scene. The others are now known to be good for it."""

@@ -75,7 +75,7 @@ SHADOW = Shader(
 
 
 def _direct(kind: LightKind, filtered: bool, one_face: bool, glossy: bool) -> Shader:
-    """Direct light of lights of one kind: ``filtered`` shadows or not, one shadow map face or any number of them."""
+    """Direct light of one light of a kind: ``filtered`` shadows or not, one shadow map face or any number of them."""
     words = [
         "frame_direct",
         kind.name.lower(),
@@ -93,16 +93,14 @@ def _direct(kind: LightKind, filtered: bool, one_face: bool, glossy: bool) -> Sh
             "position_tx": "FLOAT_2D",
             "normal_tx": "FLOAT_2D",
             **({"specular_tx": "FLOAT_2D"} if glossy else {}),
-            "light_tx": "FLOAT_2D",
-            "face_tx": "FLOAT_2D",
+            **({} if one_face else {"face_tx": "FLOAT_2D"}),
             "shadow_depth_tx": "FLOAT_2D",
             "shadow_slope_tx": "FLOAT_2D",
         },
-        structs=(LIGHT, MAP_FACE),
+        uniforms={"direct_light": LIGHT, **({"direct_face": MAP_FACE} if one_face else {})},
+        structs=(MAP_FACE,),
         constants={
             **({"pc_eye": "VEC4"} if glossy else {}),
-            "pc_first_light": "INT",
-            "pc_last_light": "INT",
             "pc_seed": "INT",
             "pc_sample": "INT",
         },
@@ -110,7 +108,8 @@ def _direct(kind: LightKind, filtered: bool, one_face: bool, glossy: bool) -> Sh
     )
 
 
-# By (kind, filtered, one face, glossy). One program for all would run through what every kind needs, for every light.
+# By (kind, filtered, one face, glossy). One program for all would run through what every kind needs, for every light;
+# and a light in a uniform block costs a pixel nothing to fetch.
 DIRECT = {
     (kind, filtered, one_face, glossy): _direct(kind, filtered, one_face, glossy)
     for kind in LightKind
