@@ -12,7 +12,11 @@ Array = np.ndarray
 Passes = dict[str, Array]  # by Blender's long name: (h, w, 3) float32, row 0 at the top
 
 # Blender below 5.0 writes short names, and the references were written with long ones.
-LONG_NAMES = {"DiffDir": "Diffuse Direct", "DiffInd": "Diffuse Indirect", "DiffCol": "Diffuse Color"}
+LONG_NAMES = {
+    old + short: f"{new} {long}"
+    for old, new in (("Diff", "Diffuse"), ("Gloss", "Glossy"))
+    for short, long in (("Dir", "Direct"), ("Ind", "Indirect"), ("Col", "Color"))
+}
 
 COMBINED = "Combined"
 INDIRECT = "DiffInd*"  # radiance of indirect diffuse light: the pass times the colour

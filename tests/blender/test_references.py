@@ -23,6 +23,7 @@ def render_shared(registered, shared_dir, tmp_path):
             setattr(scene.rebound, key, value)
         layer = scene.view_layers[0]
         layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = layer.use_pass_diffuse_color = True
+        layer.use_pass_glossy_direct = layer.use_pass_glossy_color = True
         render(scene, tmp_path / f"{name}.exr")
         truth = read_passes(Path(shared_dir) / "references" / f"{name}.{reference}.exr")
         return truth, read_passes(tmp_path / f"{name}.exr")
@@ -65,3 +66,11 @@ def test_direct_light_of_other_scenes_matches_the_path_tracer(render_shared, nam
     level, error = show(f"{name}, direct", diffuse(truth, "Direct"), diffuse(test, "Direct"))
     assert 0.98 <= level <= 1.02
     assert error <= 0.01
+
+
+def test_metals_and_plastic_match_the_path_tracer(render_shared):
+    truth, test = render_shared("glossy_metals", "one_bounce", samples=16, method="NONE")
+    for name in ("Diffuse Color", "Glossy Color", "Glossy Direct"):
+        level, error = show(f"glossy_metals, {name}", truth[name], test[name])
+        assert 0.99 <= level <= 1.01
+        assert error <= 0.01
