@@ -15,10 +15,11 @@ from ..frame.voxels import Voxels
 from ..technique import Item, Setting, Value
 from ..frame.reflective_shaders import SourceKind
 from .cache import Cache
-from .gather import Gathering
+from .gather import Gathering, PoolState
 from .index import PointIndex
 from .pool import Pool
 from .shaders import SHADERS
+from .structs import VPL_FRAME
 from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
 
 # How far a sample is after each step, for the progress bar.
@@ -146,10 +147,19 @@ SETTINGS = (
     ),
     Setting(
         "occlusion",
-        "BOOL",
+        "ENUM",
         "Occlusion",
-        "Bounced light is blocked by what lies in between. Off shows what that changes: light passes walls",
-        True,
+        "What blocks bounced light",
+        "CONTACTS",
+        items=(
+            Item("NONE", "Nothing", "Light passes walls: to see what occlusion changes"),
+            Item("VOXELS", "Voxels", "All of the scene, as coarse as its voxels"),
+            Item(
+                "CONTACTS",
+                "Voxels and Contacts",
+                "All of the scene, and what the camera sees closer than the voxels can tell, at the cost of some time",
+            ),
+        ),
     ),
 )
 
@@ -189,8 +199,9 @@ class Vpl:
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done
         for done in self._fill_pool(inputs, settings):
             yield VOXELS_DONE + (CACHE_DONE - VOXELS_DONE) * done
-        bindings = {**self._candidate_bindings(inputs, settings), "pc_kinds": ALL_KINDS}
-        for done in self.gathering.draw(inputs, settings, bindings, self.sources.revision, targets):
+        candidates = self._candidates(inputs, settings, kinds=ALL_KINDS, number=self._picture)
+        about = PoolState(self._picture, self.sources.revision)
+        for done in self.gathering.draw(inputs, settings, candidates, about, targets):
             yield CACHE_DONE + (1.0 - CACHE_DONE) * done
 
     def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
@@ -219,8 +230,12 @@ class Vpl:
         for number in range(rounds):
             self.cache.emit(self.sources, tile)
             self.pool.draw(self.sources, count, seed + number)
-            candidates = {**self._candidate_bindings(inputs, settings), "pc_kinds": ALL_KINDS if many else FIRST_HAND}
-            candidates["pc_sample"] = WARM_UP * self._picture + number
+            candidates = self._candidates(
+                inputs,
+                settings,
+                kinds=ALL_KINDS if many else FIRST_HAND,
+                number=WARM_UP * self._picture + number,
+            )
             counting = max(self._cache_updates - FORGOTTEN, 0.0) * NEWER if many else self._cache_updates
             self.cache.gather(self.sources, tile, candidates, rows, counting)
             if self._cache_updates < 2 * FORGOTTEN:  # points come to light
@@ -260,31 +275,41 @@ class Vpl:
             index.free()
         self.gathering.free()
 
-    def _candidate_bindings(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> dict[str, Any]:
-        """What vpl_candidates_lib.glsl reads."""
+    def _candidates(
+        self, inputs: FrameInputs, settings: Mapping[str, Value], *, kinds: int, number: int
+    ) -> dict[str, Any]:
+        """What vpl_candidates_lib.glsl reads; ``number`` is the sample's in its sequence of noise."""
         positions, normals, fluxes, _ = self.sources.colors
         sky = self.sources.tile_of(SKY_PATCHES)
+        frame = {
+            "clip_from_world": inputs.clip_from_world,
+            "eye": inputs.eye,
+            "sky": self.sources.viewport(sky) if sky else (0, 0, 0, 0),
+            "index": self._indices[CACHE].place,
+            "cache": self._points(CACHE),
+            "pool": int(settings["pool"]),
+            "emitters": self._points(EMITTERS),
+            "tiles": len(self.sources.tiles),
+            "light_tiles": self.sources.light_tiles,
+            "candidates": int(settings["candidates"]),
+            "occluded": int(settings["occlusion"] != "NONE"),
+            "contact": int(settings["occlusion"] == "CONTACTS"),
+            "bound": float(bool(settings["bound"])),
+            "kinds": kinds,
+            "number": number,
+            "seed": inputs.noise_seed(2),
+        }
         return {
+            "position_tx": inputs.gbuffer.position,
             "position_area_tx": positions,
             "normal_kind_tx": normals,
             "flux_tx": fluxes,
             "tile_tx": self.sources.tile_table,
             "light_tx": self.sources.light_table,
             "face_tx": self.sources.face_table,
-            **self.pool.bindings(),
-            **self.voxels.bindings(),
             "cache_index_tx": self._indices[CACHE].texture,
             "emitter_index_tx": self._indices[EMITTERS].texture,
-            "pc_index": self._indices[CACHE].place,
-            "pc_cache": self._points(CACHE),
-            "pc_emitters": self._points(EMITTERS),
-            "pc_sky": self.sources.viewport(sky) if sky else (0, 0, 0, 0),
-            "pc_sample": self._picture,
-            "pc_seed": inputs.noise_seed(2),
-            "pc_pool": int(settings["pool"]),
-            "pc_candidates": int(settings["candidates"]),
-            "pc_bound": float(bool(settings["bound"])),
-            "pc_occluded": int(settings["occlusion"]),
-            "pc_tiles": len(self.sources.tiles),
-            "pc_light_tiles": self.sources.light_tiles,
+            **self.pool.bindings(),
+            **self.voxels.bindings(),
+            "vpl_frame": VPL_FRAME.pack([frame], for_uniform=True),
         }

@@ -11,8 +11,9 @@ import numpy as np
 from ...device.interface import Device, Target, Texture
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
+from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
-from .shaders import ATROUS, GATHER, GATHER_TO_REUSE, REUSE, UPSAMPLE
+from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, GATHER_TO_REUSE, REUSE, UPSAMPLE
 from .structs import OLD_VIEW
 
 STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
@@ -23,8 +24,18 @@ LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
 MOST_REUSE = 2.0
 # Distances between the texels that one pass of the filter compares.
 FILTER_STEPS = (1, 2, 4)
+# What the reuse reads of the candidates' samplers and blocks.
+REUSE_READS = (*ATLAS_SAMPLERS, *VOXEL_SAMPLERS, "voxel_grid", "vpl_frame", "position_tx")
 # How far the gathering is after its passes, for the progress bar.
 GATHER_DONE, FILTER_DONE = 0.7, 0.8
+
+
+@dataclass(frozen=True)
+class PoolState:
+    """``number`` of the sample in its sequence of noise; ``sources_revision`` of the atlas that the pool is from."""
+
+    number: int
+    sources_revision: int
 
 
 @dataclass(eq=False)
@@ -86,18 +97,17 @@ class Gathering:
         inputs: FrameInputs,
         settings: Mapping[str, Value],
         candidates: Mapping[str, Any],
-        sources_revision: int,
+        about: PoolState,
         targets: LightTargets,
     ) -> Iterator[float]:
         """Add this sample's light to ``targets``; yields progress. ``candidates``: what vpl_candidates_lib.glsl reads."""
         stride = STRIDES[str(settings["scale"])]
-        offset = _offset(inputs.seed, candidates["pc_sample"], stride)
+        offset = _offset(inputs.seed, about.number, stride)
         grid = self._fitting(inputs, stride)
         reuses = bool(settings["reuse"])
         self.device.fullscreen(
             GATHER_TO_REUSE if reuses else GATHER,
             grid.gather_targets[0],
-            position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
             **candidates,
             pc_stride=stride,
@@ -106,7 +116,7 @@ class Gathering:
         yield GATHER_DONE
         size = (inputs.view.width, inputs.view.height)
         revision = inputs.gpu_scene.revision
-        now = _Before(inputs.clip_from_world, size, offset, stride, revision, sources_revision)
+        now = _Before(inputs.clip_from_world, size, offset, stride, revision, about.sources_revision)
         if reuses:
             self._reuse(inputs, grid, candidates, now)
             light = self._filtered(grid) if settings["denoise"] else grid.noisy[0]
@@ -132,8 +142,7 @@ class Gathering:
         self.device.fullscreen(
             REUSE,
             grid.reuse_targets[0],
-            **{name: candidates[name] for name in ("position_area_tx", "normal_kind_tx", "flux_tx")},
-            **{name: candidates[name] for name in ("voxel_tx", "voxel_grid", "pc_occluded", "pc_bound")},
+            **{name: candidates[name] for name in REUSE_READS},
             surface_tx=grid.surfaces[0],
             reservoir_tx=grid.gathered[0],
             rest_tx=grid.gathered[1],
@@ -141,8 +150,6 @@ class Gathering:
             old_reservoir_tx=grid.reservoirs[1],
             history_tx=grid.histories[1],
             old_view=(before or now).block(),
-            pc_sample=candidates["pc_sample"],
-            pc_seed=inputs.noise_seed(3),
             pc_most_reuse=reuse,
             pc_most_history=history,
         )

@@ -4,7 +4,7 @@ from ...device.shader import Shader
 from ..frame.reflective_shaders import SOURCE_DEFINES
 from ..frame.structs import LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE
 from ..frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS
-from .structs import OLD_VIEW, PYRAMID_STEP, TILE
+from .structs import OLD_VIEW, PYRAMID_STEP, TILE, VPL_FRAME
 
 # Entries of the pool in one row of its textures.
 POOL_ROW = 64
@@ -89,22 +89,6 @@ _CANDIDATES = {
     "emitter_index_tx": "FLOAT_2D",
     **VOXEL_SAMPLERS,
 }
-_CANDIDATE_CONSTANTS = {
-    "pc_sky": "VEC4",  # lower left texel and sides of the sky's tile, 0: none
-    "pc_index": "VEC4",
-    "pc_cache": "VEC3",  # lower left texel and side of the cache's points, 0: none
-    "pc_emitters": "VEC3",  # the same of the emitters'
-    "pc_sample": "INT",
-    "pc_seed": "INT",
-    "pc_pool": "INT",
-    "pc_tiles": "INT",
-    "pc_light_tiles": "INT",
-    "pc_candidates": "INT",
-    "pc_occluded": "INT",
-    "pc_bound": "FLOAT",
-    "pc_kinds": "INT",  # bits: the kinds of source that are asked
-}
-
 _LIGHTS = (*LIGHT_DEFINES, *MAP_DEFINES)
 
 
@@ -114,9 +98,9 @@ def _gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
         fragment="vpl/vpl_gather_frag.glsl",
         outputs={"out_surface": "VEC4", "out_indirect": "VEC4", "out_direct": "VEC4"},
         samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", **_CANDIDATES},
-        uniforms={"voxel_grid": VOXEL_GRID},
+        uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
         structs=(TILE, LIGHT, MAP_FACE),
-        constants={**_CANDIDATE_CONSTANTS, "pc_stride": "INT", "pc_offset": "IVEC2"},
+        constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
         defines=(*_DEFINES, *_LIGHTS, *defines),
     )
 
@@ -131,6 +115,7 @@ REUSE = Shader(
     samplers={
         **ATLAS_SAMPLERS,
         **VOXEL_SAMPLERS,
+        "position_tx": "FLOAT_2D",
         "surface_tx": "FLOAT_2D",
         "reservoir_tx": "FLOAT_2D",
         "rest_tx": "FLOAT_2D",
@@ -138,12 +123,8 @@ REUSE = Shader(
         "old_reservoir_tx": "FLOAT_2D",
         "history_tx": "FLOAT_2D",
     },
-    uniforms={"voxel_grid": VOXEL_GRID, "old_view": OLD_VIEW},
+    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME, "old_view": OLD_VIEW},
     constants={
-        "pc_sample": "INT",
-        "pc_seed": "INT",
-        "pc_occluded": "INT",
-        "pc_bound": "FLOAT",
         "pc_most_reuse": "FLOAT",  # samples that an old reservoir may stand for
         "pc_most_history": "FLOAT",  # samples that the mean before may stand for
     },
@@ -198,10 +179,10 @@ CACHE_GATHER = Shader(
     name="vpl_cache_gather",
     fragment="vpl/vpl_cache_gather_frag.glsl",
     outputs={"out_sum": "VEC4"},
-    samplers=_CANDIDATES,
-    uniforms={"voxel_grid": VOXEL_GRID},
+    samplers={"position_tx": "FLOAT_2D", **_CANDIDATES},
+    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
     structs=(TILE, LIGHT, MAP_FACE),
-    constants={**_CANDIDATE_CONSTANTS, "pc_rounds": "INT", "pc_origin": "IVEC2"},
+    constants={"pc_rounds": "INT", "pc_origin": "IVEC2"},
     defines=(*_DEFINES, *_LIGHTS),
 )
 

@@ -20,3 +20,23 @@ OLD_VIEW = Struct(
     offset="vec2",  # of its gathering pixels
     stride="float",
 )
+
+VPL_FRAME = Struct(
+    "VplFrame",
+    clip_from_world="mat4",  # of this sample's G-buffer
+    eye="vec4",  # FrameInputs.eye
+    sky="vec4",  # lower left texel and sides of the sky's tile, 0: none
+    index="vec4",  # the cube of the indices: lower corner, cells a metre
+    cache="vec3",  # lower left texel and side of the cache's points, 0: none
+    pool="int",  # entries of the pool
+    emitters="vec3",  # as cache
+    tiles="int",
+    light_tiles="int",  # they come first
+    candidates="int",  # entries that a receiver looks at
+    occluded="int",  # 1: rays test what is hidden
+    contact="int",  # 1: rays test contacts on the screen, too
+    bound="float",  # 1: lights are discs of the area they stand for, 0: points
+    kinds="int",  # bits of SourceKind: which are asked
+    number="int",  # of the sample in its sequence of noise
+    seed="int",
+)

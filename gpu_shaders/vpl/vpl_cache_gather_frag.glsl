@@ -15,8 +15,8 @@ void main()
     bool visible;
     vec3 carried;
     vec3 emitted;
-    Reservoir r = candidates_choose(place.xyz, N, N, point, i, visible, carried, emitted);
-    vec3 light = candidates_light(r, visible, place.xyz, N, N);
-    out_sum += vec4(light + emitted + ((pc_kinds >> SOURCE_CACHE & 1) != 0 ? carried : vec3(0.0)), 1.0);
+    Reservoir r = candidates_choose(place.xyz, N, N, N, point, i, visible, carried, emitted);
+    vec3 light = candidates_light(r, visible, place.xyz, N, N, N);
+    out_sum += vec4(light + emitted + ((vpl_frame.kinds >> SOURCE_CACHE & 1) != 0 ? carried : vec3(0.0)), 1.0);
   }
 }

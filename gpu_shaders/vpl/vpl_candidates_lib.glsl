@@ -2,12 +2,12 @@
  * with the receiver's cosine found, chosen for its nearness alone. Each is weighted by the balance heuristic (Veach &
  * Guibas 1995) of both, so that neither touching surfaces nor small bright patches make noise, and no clamp is needed.
  *
- * Names of samplers and constants are those of `CANDIDATES` in vpl/shaders.py. */
+ * Names of samplers and constants are those of `CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of vpl/structs.py. */
 #include "frame/light_map_lib.glsl"
-#include "frame/voxel_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
 #include "vpl/vpl_index_lib.glsl"
+#include "vpl/vpl_reach_lib.glsl"
 
 /* A texel answers for a ray's hit that lies no farther away than so many voxels and so many of its own widths. */
 const float CANDIDATES_VOXELS = 2.0;
@@ -20,7 +20,7 @@ const float CANDIDATES_OFF_PLANE = 0.5;
 /* Strength of all sources. */
 float candidates_total()
 {
-  return texelFetch(sums_tx, ivec2(pc_tiles - 1, 0), 0).y;
+  return texelFetch(sums_tx, ivec2(vpl_frame.tiles - 1, 0), 0).y;
 }
 
 /* Two unit vectors that make a frame with n (Duff et al. 2017). */
@@ -47,12 +47,12 @@ vec3 candidates_cosine_direction(vec3 n, vec2 noise)
 int candidates_lamp(float u, out float share)
 {
   share = 0.0;
-  float lights = pc_light_tiles > 0 ? texelFetch(sums_tx, ivec2(pc_light_tiles - 1, 0), 0).z : 0.0;
+  float lights = vpl_frame.light_tiles > 0 ? texelFetch(sums_tx, ivec2(vpl_frame.light_tiles - 1, 0), 0).z : 0.0;
   if (lights <= 0.0) {
     return -1;
   }
   int low = 0;
-  int high = pc_light_tiles - 1;
+  int high = vpl_frame.light_tiles - 1;
   while (low < high) {
     int middle = (low + high) / 2;
     if (texelFetch(sums_tx, ivec2(middle, 0), 0).z > u * lights) {
@@ -89,7 +89,7 @@ Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
 /* The patch of sky in this direction. */
 Vpl candidates_sky(vec3 direction)
 {
-  vec4 place = pc_sky; /* origin, side of its tile */
+  vec4 place = vpl_frame.sky; /* origin, side of its tile */
   ivec2 texel = ivec2(place.xy + min(floor((0.5 + 0.5 * octahedron_encode(direction)) * place.z), place.z - 1.0));
   int id = vpl_id(texel, SOURCE_SKY);
   return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, id);
@@ -100,16 +100,16 @@ Vpl candidates_sky(vec3 direction)
  * so that over many rays the cells' values blend; a second try takes the hit's own. */
 vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
 {
-  for (int attempt = 0; attempt < 2 && pc_cache.z > 0.0; attempt++) {
-    vec3 place = index_place(hit) + (attempt == 0 ? noise - 0.5 : vec3(0.0));
-    float nearest = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_OFF_PLANE / pc_index.w;
+  for (int attempt = 0; attempt < 2 && vpl_frame.cache.z > 0.0; attempt++) {
+    vec3 place = index_place(vpl_frame.index, hit) + (attempt == 0 ? noise - 0.5 : vec3(0.0));
+    float nearest = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
     ivec2 found = ivec2(-1);
     for (int axis = 0; axis < 3; axis++) {
       int point = index_point(cache_index_tx, place, index_side(axis, -direction[axis]));
       if (point < 0) {
         continue;
       }
-      ivec2 texel = index_atlas_texel(pc_cache, point);
+      ivec2 texel = index_atlas_texel(vpl_frame.cache, point);
       vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
       float off = abs(dot(texelFetch(position_area_tx, texel, 0).xyz - hit, n));
       if (dot(n, direction) < 0.0 && off < nearest) {
@@ -132,26 +132,26 @@ vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
  * of it by the balance heuristic. */
 vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
 {
-  vec3 place = index_place(hit);
-  for (int axis = 0; axis < 3 && pc_emitters.z > 0.0; axis++) {
+  vec3 place = index_place(vpl_frame.index, hit);
+  for (int axis = 0; axis < 3 && vpl_frame.emitters.z > 0.0; axis++) {
     int point = index_point(emitter_index_tx, place, index_side(axis, -direction[axis]));
     if (point < 0) {
       continue;
     }
-    ivec2 texel = index_atlas_texel(pc_emitters, point);
+    ivec2 texel = index_atlas_texel(vpl_frame.emitters, point);
     vec4 lamp = texelFetch(position_area_tx, texel, 0);
     vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
     vec3 apart = hit - lamp.xyz;
     float cosine = -dot(n, direction);
     /* The hit must lie on the point's plane, and no farther from it than the cell around it reaches. */
     if (cosine <= 0.0 || abs(dot(apart, n)) > CANDIDATES_VOXELS * voxel_grid.edge ||
-        dot(apart, apart) * pc_index.w * pc_index.w > CANDIDATES_CELLS * CANDIDATES_CELLS) {
+        dot(apart, apart) * vpl_frame.index.w * vpl_frame.index.w > CANDIDATES_CELLS * CANDIDATES_CELLS) {
       continue;
     }
     vec3 flux = texelFetch(flux_tx, texel, 0).rgb;
     vec3 to_hit = hit - P;
     float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
-    float by_pool = float(pc_candidates) * vpl_strength(flux) / (candidates_total() * lamp.w);
+    float by_pool = float(vpl_frame.candidates) * vpl_strength(flux) / (candidates_total() * lamp.w);
     return flux / (MATH_PI * lamp.w) * (by_ray / (by_ray + by_pool));
   }
   return vec3(0.0);
@@ -160,25 +160,25 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
 /* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. `carried` and
  * `emitted` are one ray's estimates of the irradiance / pi from the cache, and of the part of that from emitters. Receivers and their
  * rounds, of the same sample, differ in `pixel` or in `round`. */
-Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int round, out bool visible,
+Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec2 pixel, int round, out bool visible,
                             out vec3 carried, out vec3 emitted)
 {
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
   visible = false;
   carried = vec3(0.0);
   emitted = vec3(0.0);
-  int count = pc_candidates;
-  int seed = pc_seed + 4 * round;
-  vec2 start = sampling_r2(pc_sample, sampling_hash(pixel, seed));
+  int count = vpl_frame.candidates;
+  int seed = vpl_frame.seed + 4 * round;
+  vec2 start = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed));
   float u = start.y;
-  float stratum = float(pc_pool) / float(count);
+  float stratum = float(vpl_frame.pool) / float(count);
   float candidates = float(count);
   for (int i = 0; i < count; i++) {
-    int entry = min(int((float(i) + start.x) * stratum), pc_pool - 1);
+    int entry = min(int((float(i) + start.x) * stratum), vpl_frame.pool - 1);
     ivec2 at = ivec2(entry % VPL_POOL_ROW, entry / VPL_POOL_ROW);
     vec4 facing = texelFetch(pool_normal_tx, at, 0);
     int id = floatBitsToInt(facing.w);
-    if ((pc_kinds >> vpl_id_kind(id) & 1) == 0) {
+    if ((vpl_frame.kinds >> vpl_id_kind(id) & 1) == 0) {
       continue;
     }
     vec4 flux = texelFetch(pool_flux_tx, at, 0);
@@ -188,23 +188,23 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int rou
     float by_ray = facing.z * place.w * form * (1.0 / MATH_PI);
     reservoir_offer(r, id, target / max(candidates * flux.w + by_ray, 1e-30), target, u);
   }
-  vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, seed + 1));
+  vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
   vec3 direction = candidates_cosine_direction(N, noise);
   if (dot(direction, geometric) > 0.0) {
-    vec3 origin = voxel_start(P, geometric);
+    vec3 origin = voxel_start_seen(P, geometric, seen_from);
     float far = voxel_trace(origin, direction, 1e30);
     float share = 1.0;
     Vpl seen = VPL_NONE;
     if (far >= 0.0) {
-      vec2 choice = sampling_r2(pc_sample, sampling_hash(pixel, seed + 2));
+      vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
       vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
       emitted = candidates_emitted(P, N, hit, direction);
       carried = candidates_carried(hit, direction, vec3(sampling_hash(pixel, seed + 3), choice.y));
-      int tile = (pc_kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
+      int tile = (vpl_frame.kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
         seen = candidates_seen(hit, direction, tile);
       }
-    } else if (pc_sky.z > 0.0) {
+    } else if (vpl_frame.sky.z > 0.0) {
       seen = candidates_sky(direction);
     }
     float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
@@ -223,13 +223,13 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, ivec2 pixel, int rou
 }
 
 /* The chosen light's irradiance / pi, if it is seen. */
-vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric)
+vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric, vec3 seen_from)
 {
   if (r.id == 0) {
     return vec3(0.0);
   }
   Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
-  if (!visible && pc_occluded != 0 && !voxel_visible(P, geometric, vpl.position, vpl.normal)) {
+  if (!visible && !reach_sees(P, geometric, seen_from, vpl)) {
     return vec3(0.0);
   }
   return vpl_light(vpl, P, N) * (r.sum / r.target);

@@ -16,11 +16,12 @@ void main()
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
+  vec3 seen_from = reach_eye(P);
   bool visible;
   vec3 carried;
   vec3 emitted;
-  Reservoir r = candidates_choose(P, N, geometric, pixel, 0, visible, carried, emitted);
-  vec3 light = candidates_light(r, visible, P, N, geometric);
+  Reservoir r = candidates_choose(P, N, geometric, seen_from, pixel, 0, visible, carried, emitted);
+  vec3 light = candidates_light(r, visible, P, N, geometric, seen_from);
   out_surface = surface_pack(P, N);
 #ifdef REUSE
   bool lit = any(greaterThan(light, vec3(0.0)));

@@ -1,13 +1,13 @@
 /* Which point of the cache lies near: a cube of VPL_INDEX cells along a side around the scene, six sides of each cell for
- * the ways that surfaces face. pc_index holds the cube's lower corner and cells a metre. A flat texture has the six
+ * the ways that surfaces face. `cube` is its lower corner and cells a metre. A flat texture has the six
  * sides side by side, and the cells' layers one above the other. */
 
 const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX * VPL_INDEX);
 
 /* In cells. */
-vec3 index_place(vec3 P)
+vec3 index_place(vec4 cube, vec3 P)
 {
-  return (P - pc_index.xyz) * pc_index.w;
+  return (P - cube.xyz) * cube.w;
 }
 
 int index_side(int axis, float toward)

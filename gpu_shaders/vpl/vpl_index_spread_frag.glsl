@@ -23,7 +23,7 @@ void main()
     }
     int index = int(point) - 1;
     vec3 P = texelFetch(position_area_tx, pc_origin + ivec2(index % pc_side, index / pc_side), 0).xyz;
-    vec3 apart = index_place(P) - (vec3(cell) + 0.5);
+    vec3 apart = index_place(pc_index, P) - (vec3(cell) + 0.5);
     float squared = dot(apart, apart);
     if (squared < nearest) {
       nearest = squared;

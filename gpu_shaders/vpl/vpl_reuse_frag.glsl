@@ -1,9 +1,9 @@
 /* Spatiotemporal reuse (Bitterli et al. 2020): this sample's reservoir, the one that the surface had in the picture before
  * and some of its neighbours there become one, weighted by the candidates they stand for on surfaces where the chosen
  * light shines at all. The result joins the mean of the light that the surface had before. */
-#include "frame/voxel_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
+#include "vpl/vpl_reach_lib.glsl"
 #include "vpl/vpl_surface_lib.glsl"
 
 /* Reservoirs of neighbours that are asked, and from how far, in texels. */
@@ -11,6 +11,8 @@ const int REUSE_NEIGHBOURS = 2;
 const float REUSE_RADIUS = 6.0;
 /* Neighbours less alike than this give nothing. */
 const float REUSE_ALIKE = 0.5;
+/* Apart from the seeds of the candidates. */
+const int REUSE_SEED = 1024;
 /* Means of fewer samples than this do not know their variance. */
 const float REUSE_FEW = 4.0;
 /* Their variance is taken for this, so that only surfaces keep the filter from mixing. */
@@ -81,7 +83,7 @@ void main()
   bool before = clip.w > 0.0 && pc_most_history > 0.0;
 
   vec4 own = texelFetch(reservoir_tx, texel, 0);
-  vec2 noise = sampling_r2(pc_sample, sampling_hash(texel, pc_seed));
+  vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(texel, vpl_frame.seed + REUSE_SEED));
   float u = noise.x;
   Source sources[REUSE_NEIGHBOURS + 2];
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
@@ -113,7 +115,7 @@ void main()
     }
     weight = r.sum / max(able * r.target, 1e-30);
     bool own_choice = r.id == floatBitsToInt(own.x);
-    if (!own_choice && pc_occluded != 0 && !voxel_visible(at.P, at.N, vpl.position, vpl.normal)) {
+    if (!own_choice && !reach_sees(at.P, at.N, reach_eye(at.P), vpl)) {
       weight = 0.0;
     }
     light += vpl_light(vpl, at.P, at.N) * weight;

@@ -1,0 +1,67 @@
+/* Whether light reaches a surface: a ray through the voxels, and for contacts that they are too coarse for a short one over
+ * the screen. Needs position_tx, the G-buffer's, and vpl_frame beside what voxel_lib.glsl needs. */
+#include "frame/voxel_lib.glsl"
+#include "vpl/vpl_lib.glsl"
+
+/* The ray over the screen: its length and the thickness of what blocks it, both in voxels; its steps. */
+const float REACH_CONTACT = 4.0;
+const float REACH_THICKNESS = 2.0;
+const int REACH_STEPS = 6;
+/* Voxels by which a surface must lie before the ray: less is the rounding of a picture's pixels. */
+const float REACH_BEFORE = 0.25;
+
+float reach_depth(vec3 P)
+{
+  return vpl_frame.eye.w > 0.5 ? distance(P, vpl_frame.eye.xyz) : -dot(P, vpl_frame.eye.xyz);
+}
+
+vec3 reach_place(vec3 P)
+{
+  vec4 clip = vpl_frame.clip_from_world * vec4(P, 1.0);
+  return vec3(0.5 + 0.5 * clip.xy / clip.w, clip.w);
+}
+
+/* Whether no surface that the camera sees lies just before the first part of the way to Q. Where a picture's pixels are
+ * coarser than the ray's steps they tell nothing. */
+bool reach_contact(vec3 P, vec3 Q)
+{
+  vec2 size = vec2(textureSize(position_tx, 0));
+  float reach = distance(P, Q);
+  float span = min(REACH_CONTACT * voxel_grid.edge, reach - REACH_THICKNESS * voxel_grid.edge);
+  vec3 direction = (Q - P) / reach;
+  vec3 first = reach_place(P);
+  vec3 last = reach_place(P + span * direction);
+  if (span <= 0.0 || last.z <= 0.0 || distance(first.xy * size, last.xy * size) < float(REACH_STEPS)) {
+    return true;
+  }
+  for (int i = 0; i < REACH_STEPS; i++) {
+    vec3 p = P + direction * (span * (float(i) + 0.5) / float(REACH_STEPS));
+    vec2 place = reach_place(p).xy;
+    if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(1.0)))) {
+      return true;
+    }
+    vec4 seen = texelFetch(position_tx, ivec2(place * size), 0);
+    float before = reach_depth(p) - reach_depth(seen.xyz);
+    if (seen.w != 0.0 && before > REACH_BEFORE * voxel_grid.edge && before < REACH_THICKNESS * voxel_grid.edge) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Whether a surface at P, seen from the unit direction `seen_from`, sees the light. */
+bool reach_sees(vec3 P, vec3 geometric, vec3 seen_from, Vpl vpl)
+{
+  if (vpl_frame.occluded == 0 || distance(P, vpl.position) < VOXEL_NEAREST * voxel_grid.edge) {
+    return true;
+  }
+  vec3 start = voxel_start_seen(P, geometric, seen_from);
+  return voxel_clear(start, voxel_start(vpl.position, vpl.normal)) &&
+         (vpl_frame.contact == 0 || reach_contact(P, vpl.position));
+}
+
+/* From P to the camera. */
+vec3 reach_eye(vec3 P)
+{
+  return vpl_frame.eye.w > 0.5 ? normalize(vpl_frame.eye.xyz - P) : vpl_frame.eye.xyz;
+}
