@@ -114,6 +114,7 @@ def test_negative_light_is_dropped_and_named():
     [
         ("POINT", "shadow_soft_size", "radius"),
         ("POINT", "diffuse_factor", "diffuse factor"),
+        ("POINT", "specular_factor", "specular factor"),
         ("POINT", "energy", "power"),
         ("POINT", "exposure", "exposure"),
         ("SPOT", "shadow_soft_size", "radius"),
@@ -155,6 +156,14 @@ def test_temperature_that_is_not_a_number_gives_no_such_power():
 def test_ray_visibility_switches_diffuse_light():
     lamp("POINT").visible_diffuse = False
     assert only_light()[0].diffuse_factor == 0
+
+
+def test_specular_factor_and_its_ray_visibility_are_read():
+    shown = lamp("POINT", specular_factor=0.25)
+    assert only_light()[0].specular_factor == 0.25
+    shown.visible_glossy = False
+    light, _ = only_light()
+    assert (light.diffuse_factor, light.specular_factor) == (1.0, 0.0)
 
 
 def test_hidden_light_is_dropped():
