@@ -4,6 +4,7 @@
 #include "frame/light_lib.glsl"
 #include "frame/map_lib.glsl"
 #include "frame/surface_lib.glsl"
+#include "lib/lobe_lib.glsl"
 
 /* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond
  * this cosine. */
@@ -25,19 +26,18 @@ void main()
     float cosine = 1.0 / (gl_FragCoord.w * sqrt(distance_squared));
     measure *= cosine * cosine * cosine;
   }
-  vec3 albedo = vec3(0.0);
-  if (pc_reflects != 0) {
-    albedo = surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv)
-                 .albedo;
-  }
+  Surface surface =
+      surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv);
+  surface = surface_toward(surface, dot(normal, d));
+  float reflects = float(pc_reflects);
   /* A sun's wide map sends no light from where the one inside it does. */
   if (pc_served >= 0) {
     MapFace inner = map_face_fetch(face_tx, pc_served);
     if (map_holds(inner, map_position(inner, v_position))) {
-      albedo = vec3(0.0);
+      reflects = 0.0;
     }
   }
-  vec3 flux = light_intensity(light, -d) * measure * albedo;
+  vec3 flux = light_intensity(light, -d) * measure * reflects;
   /* A disc that turns to the receiver gives 1 / (d^2 + r^2) where a point gives 1 / d^2. */
   flux *= distance_squared / (distance_squared + light.soft_radius_squared);
   float area = measure * distance_squared / max(dot(geometric, d), REFLECTIVE_GRAZING);
@@ -45,6 +45,6 @@ void main()
   gl_FragDepth = pc_perspective != 0 ? map_depth(1.0 / (pc_far * gl_FragCoord.w)) : clamp(gl_FragCoord.z, 0.0, 1.0);
   out_position_area = vec4(v_position, area);
   out_normal = vec4(normal, float(SOURCE_BOUNCE));
-  out_flux = vec4(flux, 1.0);
-  out_specular = vec4(0.0);
+  out_flux = vec4(flux * surface.albedo, 1.0);
+  out_specular = vec4(flux * surface.specular, lobe_pack(surface.roughness, d));
 }

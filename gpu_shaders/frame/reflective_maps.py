@@ -26,7 +26,7 @@ _PLACE = {"first_face": 0}
 
 class ReflectiveShadowMaps(LightMaps):
     """Colour textures: position and texel area (RGBA32F); normal and kind of source (RGBA16F); diffusely reflected flux
-    in watts and how much it counts where texels are chosen by strength (RGBA32F); incident flux times specular reflectance, and roughness (RGBA32F).
+    in watts and how much it counts where texels are chosen by strength (RGBA32F); incident flux times specular reflectance, and its lobe (RGBA32F, lobe_lib.glsl).
 
     All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
     """

@@ -23,6 +23,8 @@ void main()
   } else {
     out_normal = vec4(normal, float(SOURCE_CACHE));
     out_flux = vec4(0.0, 0.0, 0.0, 1.0);
-    out_reflectance = vec4(surface.albedo, 1.0);
+    /* The specular lobe as if it were diffuse: the light that it sends on is right in sum, not in direction. */
+    vec3 lobe = bxdf_albedo(surface.specular, surface.roughness, BXDF_MEAN_COSINE);
+    out_reflectance = vec4(min(surface.albedo + (surface.specular == vec3(0.0) ? vec3(0.0) : lobe), 1.0), 1.0);
   }
 }

@@ -146,6 +146,16 @@ SETTINGS = (
         True,
     ),
     Setting(
+        "lobe",
+        "FLOAT",
+        "Least Roughness of Bounces",
+        "Glossy surfaces send light on as if they were at least this rough. Lower is truer to caustics, and noisier; "
+        "higher spreads them",
+        0.25,
+        minimum=0.0,
+        maximum=1.0,
+    ),
+    Setting(
         "occlusion",
         "ENUM",
         "Occlusion",
@@ -237,7 +247,7 @@ class Vpl:
                 number=WARM_UP * self._picture + number,
             )
             counting = max(self._cache_updates - FORGOTTEN, 0.0) * NEWER if many else self._cache_updates
-            self.cache.gather(self.sources, tile, candidates, rows, counting)
+            self.cache.gather(self.sources, tile, candidates, rows, counting, inputs.gpu_scene.is_glossy)
             if self._cache_updates < 2 * FORGOTTEN:  # points come to light
                 self.cache.emit(self.sources, tile)
                 self._sort_points()
@@ -279,7 +289,7 @@ class Vpl:
         self, inputs: FrameInputs, settings: Mapping[str, Value], *, kinds: int, number: int
     ) -> dict[str, Any]:
         """What vpl_candidates_lib.glsl reads; ``number`` is the sample's in its sequence of noise."""
-        positions, normals, fluxes, _ = self.sources.colors
+        positions, normals, fluxes, speculars = self.sources.colors
         sky = self.sources.tile_of(SKY_PATCHES)
         frame = {
             "clip_from_world": inputs.clip_from_world,
@@ -295,6 +305,7 @@ class Vpl:
             "occluded": int(settings["occlusion"] != "NONE"),
             "contact": int(settings["occlusion"] == "CONTACTS"),
             "bound": float(bool(settings["bound"])),
+            "lobe": float(settings["lobe"]),
             "kinds": kinds,
             "number": number,
             "seed": inputs.noise_seed(2),
@@ -304,6 +315,7 @@ class Vpl:
             "position_area_tx": positions,
             "normal_kind_tx": normals,
             "flux_tx": fluxes,
+            "specular_tx": speculars,
             "tile_tx": self.sources.tile_table,
             "light_tx": self.sources.light_table,
             "face_tx": self.sources.face_table,

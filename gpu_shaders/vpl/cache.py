@@ -49,7 +49,7 @@ class Cache:
         )
 
     def gather(
-        self, sources: Sources, tile: MapTile, candidates: Mapping[str, Any], rows: int, updates: float
+        self, sources: Sources, tile: MapTile, candidates: Mapping[str, Any], rows: int, updates: float, glossy: bool
     ) -> None:
         """Gather at the points of the next ``rows`` rows. ``updates``: how many of each point's count, 0 for none."""
         place = sources.points_viewport(tile)
@@ -62,7 +62,7 @@ class Cache:
         span = (self._next_row, self._next_row + rows)
         self.device.fullscreen(CACHE_FADE, target, sum_tx=old, pc_most=most, pc_rows=span)
         self.device.fullscreen(
-            CACHE_GATHER,
+            CACHE_GATHER[glossy],
             target,
             state=ADD,
             viewport=(0, self._next_row, place[2], rows),

@@ -13,7 +13,7 @@ from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
-from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, GATHER_TO_REUSE, REUSE, UPSAMPLE
+from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, REFLECT, REUSE, UPSAMPLE
 from .structs import OLD_VIEW
 
 STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
@@ -51,11 +51,13 @@ class _Grid:
     gather_targets: list[Target]
     reuse_targets: list[Target]
     noisy_targets: list[Target]
+    reflected: list[Texture]
+    reflect_target: Target
 
     @property
     def resources(self) -> tuple[Texture | Target, ...]:
-        targets = (*self.gather_targets, *self.reuse_targets, *self.noisy_targets)
-        return (*targets, *self.surfaces, *self.gathered, *self.reservoirs, *self.histories, *self.noisy)
+        targets = (*self.gather_targets, *self.reuse_targets, *self.noisy_targets, self.reflect_target)
+        return (*targets, *self.surfaces, *self.gathered, *self.reservoirs, *self.histories, *self.noisy, *self.reflected)
 
     def turn(self) -> None:
         """Make what is newest the picture before."""
@@ -106,7 +108,7 @@ class Gathering:
         grid = self._fitting(inputs, stride)
         reuses = bool(settings["reuse"])
         self.device.fullscreen(
-            GATHER_TO_REUSE if reuses else GATHER,
+            GATHER[reuses, inputs.gpu_scene.is_glossy],
             grid.gather_targets[0],
             normal_tx=inputs.gbuffer.normal,
             **candidates,
@@ -124,6 +126,9 @@ class Gathering:
         else:
             for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
                 self._upsample(inputs, now, grid, light, target)
+        if inputs.gpu_scene.is_glossy:
+            yield FILTER_DONE
+            self._reflect(inputs, settings, candidates, grid, now, targets)
         self._before = now if reuses else None
 
     def free(self) -> None:
@@ -140,7 +145,7 @@ class Gathering:
             # Samples of a still view are to be independent, or their mean would converge more slowly.
             reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
         self.device.fullscreen(
-            REUSE,
+            REUSE[inputs.gpu_scene.is_glossy],
             grid.reuse_targets[0],
             **{name: candidates[name] for name in REUSE_READS},
             surface_tx=grid.surfaces[0],
@@ -153,6 +158,28 @@ class Gathering:
             pc_most_reuse=reuse,
             pc_most_history=history,
         )
+
+    def _reflect(
+        self,
+        inputs: FrameInputs,
+        settings: Mapping[str, Value],
+        candidates: Mapping[str, Any],
+        grid: _Grid,
+        now: _Before,
+        targets: LightTargets,
+    ) -> None:
+        """Add what glossy surfaces reflect."""
+        self.device.fullscreen(
+            REFLECT,
+            grid.reflect_target,
+            normal_tx=inputs.gbuffer.normal,
+            specular_color_tx=inputs.gbuffer.specular,
+            **candidates,
+            pc_stride=now.stride,
+            pc_offset=now.offset,
+        )
+        for light, target in zip(grid.reflected, (targets.glossy_indirect, targets.glossy_direct), strict=True):
+            self._upsample(inputs, now, grid, light, target)
 
     def _filtered(self, grid: _Grid) -> Texture:
         newest = 0
@@ -195,7 +222,7 @@ def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
     def pair() -> list[Texture]:
         return [device.texture(size, "RGBA32F") for _ in range(2)]
 
-    surfaces, gathered, reservoirs, histories, noisy = pair(), tuple(pair()), pair(), pair(), pair()
+    surfaces, gathered, reservoirs, histories, noisy, reflected = pair(), tuple(pair()), pair(), pair(), pair(), pair()
     # Reuse writes the first of the noisy pair; the filter goes to and fro between both.
     return _Grid(
         size,
@@ -207,4 +234,6 @@ def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
         [device.target([surface, *gathered]) for surface in surfaces],
         [device.target([r, h, noisy[0]]) for r, h in zip(reservoirs, histories, strict=True)],
         [device.target([texture]) for texture in noisy],
+        reflected,
+        device.target(reflected),
     )

@@ -36,7 +36,7 @@ class Pool:
         rows = -(-count // POOL_ROW)
         if self._entry_target is None or self._entry_target.size[1] != rows:
             self._free_entries()
-            self._entries = tuple(self.device.texture((POOL_ROW, rows), "RGBA32F") for _ in range(3))
+            self._entries = tuple(self.device.texture((POOL_ROW, rows), "RGBA32F") for _ in range(4))
             self._entry_target = self.device.target(self._entries)
         positions, normals, fluxes, speculars = sources.colors
         self.device.fullscreen(
@@ -58,7 +58,7 @@ class Pool:
 
     def bindings(self) -> Mapping[str, Any]:
         """The samplers of the entries and of the tiles' sums."""
-        names = ("pool_position_tx", "pool_normal_tx", "pool_flux_tx")
+        names = ("pool_position_tx", "pool_normal_tx", "pool_flux_tx", "pool_specular_tx")
         return {**dict(zip(names, self._entries, strict=True)), "sums_tx": self._levels["sums"][0]}
 
     def free(self) -> None:

@@ -48,15 +48,19 @@ TILES = Shader(
 )
 
 # The atlas, as every pass behind it reads it.
-ATLAS_SAMPLERS = {"position_area_tx": "FLOAT_2D", "normal_kind_tx": "FLOAT_2D", "flux_tx": "FLOAT_2D"}
+ATLAS_SAMPLERS = {
+    "position_area_tx": "FLOAT_2D",
+    "normal_kind_tx": "FLOAT_2D",
+    "flux_tx": "FLOAT_2D",
+    "specular_tx": "FLOAT_2D",
+}
 
 POOL = Shader(
     name="vpl_pool",
     fragment="vpl/vpl_pool_frag.glsl",
-    outputs={"out_position": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4"},
+    outputs={"out_position": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_specular": "VEC4"},
     samplers={
         **ATLAS_SAMPLERS,
-        "specular_tx": "FLOAT_2D",
         "fine_tx": "FLOAT_2D",
         "middle_tx": "FLOAT_2D",
         "coarse_tx": "FLOAT_2D",
@@ -81,6 +85,7 @@ _CANDIDATES = {
     "pool_position_tx": "FLOAT_2D",
     "pool_normal_tx": "FLOAT_2D",
     "pool_flux_tx": "FLOAT_2D",
+    "pool_specular_tx": "FLOAT_2D",
     "sums_tx": "FLOAT_2D",
     "tile_tx": "FLOAT_2D",
     "light_tx": "FLOAT_2D",
@@ -105,31 +110,54 @@ def _gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
     )
 
 
-GATHER = _gather("vpl_gather", ())
-GATHER_TO_REUSE = _gather("vpl_gather_to_reuse", (("REUSE", "1"),))
+_GLOSSY = (("GLOSSY", "1"),)
+_REUSE = (("REUSE", "1"),)
+# By whether the result is reused, and whether anything in the scene is glossy.
+GATHER = {
+    (False, False): _gather("vpl_gather", ()),
+    (False, True): _gather("vpl_gather_glossy", _GLOSSY),
+    (True, False): _gather("vpl_gather_to_reuse", _REUSE),
+    (True, True): _gather("vpl_gather_to_reuse_glossy", (*_REUSE, *_GLOSSY)),
+}
 
-REUSE = Shader(
-    name="vpl_reuse",
-    fragment="vpl/vpl_reuse_frag.glsl",
-    outputs={"out_reservoir": "VEC4", "out_history": "VEC4", "out_noisy": "VEC4"},
-    samplers={
-        **ATLAS_SAMPLERS,
-        **VOXEL_SAMPLERS,
-        "position_tx": "FLOAT_2D",
-        "surface_tx": "FLOAT_2D",
-        "reservoir_tx": "FLOAT_2D",
-        "rest_tx": "FLOAT_2D",
-        "old_surface_tx": "FLOAT_2D",
-        "old_reservoir_tx": "FLOAT_2D",
-        "history_tx": "FLOAT_2D",
-    },
-    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME, "old_view": OLD_VIEW},
-    constants={
-        "pc_most_reuse": "FLOAT",  # samples that an old reservoir may stand for
-        "pc_most_history": "FLOAT",  # samples that the mean before may stand for
-    },
-    defines=_DEFINES,
+REFLECT = Shader(
+    name="vpl_reflect",
+    fragment="vpl/vpl_reflect_frag.glsl",
+    outputs={"out_indirect": "VEC4", "out_direct": "VEC4"},
+    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "specular_color_tx": "FLOAT_2D", **_CANDIDATES},
+    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
+    structs=(TILE, LIGHT, MAP_FACE),
+    constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
+    defines=(*_DEFINES, *_LIGHTS, *_GLOSSY),
 )
+
+def _reuse(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+    return Shader(
+        name=name,
+        fragment="vpl/vpl_reuse_frag.glsl",
+        outputs={"out_reservoir": "VEC4", "out_history": "VEC4", "out_noisy": "VEC4"},
+        samplers={
+            **ATLAS_SAMPLERS,
+            **VOXEL_SAMPLERS,
+            "position_tx": "FLOAT_2D",
+            "surface_tx": "FLOAT_2D",
+            "reservoir_tx": "FLOAT_2D",
+            "rest_tx": "FLOAT_2D",
+            "old_surface_tx": "FLOAT_2D",
+            "old_reservoir_tx": "FLOAT_2D",
+            "history_tx": "FLOAT_2D",
+        },
+        uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME, "old_view": OLD_VIEW},
+        constants={
+            "pc_most_reuse": "FLOAT",  # samples that an old reservoir may stand for
+            "pc_most_history": "FLOAT",  # samples that the mean before may stand for
+        },
+        defines=(*_DEFINES, *defines),
+    )
+
+
+# By whether anything in the scene is glossy.
+REUSE = {False: _reuse("vpl_reuse", ()), True: _reuse("vpl_reuse_glossy", _GLOSSY)}
 
 ATROUS = Shader(
     name="vpl_atrous",
@@ -175,16 +203,20 @@ CACHE_FADE = Shader(
     constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
 )
 
-CACHE_GATHER = Shader(
-    name="vpl_cache_gather",
-    fragment="vpl/vpl_cache_gather_frag.glsl",
-    outputs={"out_sum": "VEC4"},
-    samplers={"position_tx": "FLOAT_2D", **_CANDIDATES},
-    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
-    structs=(TILE, LIGHT, MAP_FACE),
-    constants={"pc_rounds": "INT", "pc_origin": "IVEC2"},
-    defines=(*_DEFINES, *_LIGHTS),
-)
+def _cache_gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+    return Shader(
+        name=name,
+        fragment="vpl/vpl_cache_gather_frag.glsl",
+        outputs={"out_sum": "VEC4"},
+        samplers={"position_tx": "FLOAT_2D", **_CANDIDATES},
+        uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
+        structs=(TILE, LIGHT, MAP_FACE),
+        constants={"pc_rounds": "INT", "pc_origin": "IVEC2"},
+        defines=(*_DEFINES, *_LIGHTS, *defines),
+    )
+
+
+CACHE_GATHER = {False: _cache_gather("vpl_cache_gather", ()), True: _cache_gather("vpl_cache_gather_glossy", _GLOSSY)}
 
 CACHE_EMIT = Shader(
     name="vpl_cache_emit",
@@ -194,4 +226,20 @@ CACHE_EMIT = Shader(
     constants={"pc_origin": "IVEC2"},
 )
 
-SHADERS = (INDEX_SCATTER, INDEX_SPREAD, CACHE_FADE, CACHE_GATHER, CACHE_EMIT, SKY, LUMINANCE, REDUCE, TILES, POOL, GATHER, GATHER_TO_REUSE, REUSE, ATROUS, UPSAMPLE)
+SHADERS = (
+    INDEX_SCATTER,
+    INDEX_SPREAD,
+    CACHE_FADE,
+    *CACHE_GATHER.values(),
+    CACHE_EMIT,
+    SKY,
+    LUMINANCE,
+    REDUCE,
+    TILES,
+    POOL,
+    *GATHER.values(),
+    REFLECT,
+    *REUSE.values(),
+    ATROUS,
+    UPSAMPLE,
+)

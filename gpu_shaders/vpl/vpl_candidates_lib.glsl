@@ -12,8 +12,8 @@
 /* A texel answers for a ray's hit that lies no farther away than so many voxels and so many of its own widths. */
 const float CANDIDATES_VOXELS = 2.0;
 const float CANDIDATES_TEXELS = 1.5;
-/* A point on an emitter answers for hits up to so many cells of the index away. */
-const float CANDIDATES_CELLS = 1.0;
+/* A point on an emitter answers for hits up to so many cells of the index away: a cell's diagonal. */
+const float CANDIDATES_CELLS = 1.75;
 /* A point of the cache answers for hits that lie so many cells off its plane. */
 const float CANDIDATES_OFF_PLANE = 0.5;
 
@@ -23,24 +23,11 @@ float candidates_total()
   return texelFetch(sums_tx, ivec2(vpl_frame.tiles - 1, 0), 0).y;
 }
 
-/* Two unit vectors that make a frame with n (Duff et al. 2017). */
-void candidates_frame(vec3 n, out vec3 x, out vec3 y)
-{
-  float s = n.z >= 0.0 ? 1.0 : -1.0;
-  float a = -1.0 / (s + n.z);
-  float b = n.x * n.y * a;
-  x = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
-  y = vec3(b, s + n.y * n.y * a, -n.y);
-}
-
 vec3 candidates_cosine_direction(vec3 n, vec2 noise)
 {
-  vec3 x;
-  vec3 y;
-  candidates_frame(n, x, y);
   float radius = sqrt(noise.x);
   float angle = 2.0 * MATH_PI * noise.y;
-  return radius * (cos(angle) * x + sin(angle) * y) + sqrt(max(1.0 - noise.x, 0.0)) * n;
+  return bxdf_frame(n) * vec3(radius * cos(angle), radius * sin(angle), sqrt(max(1.0 - noise.x, 0.0)));
 }
 
 /* One of the lights, in proportion to what its tiles send: index of one of its tiles, or -1; `share` its part. */
@@ -83,7 +70,7 @@ Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
   if (normal_kind.w == 0.0 || dot(apart, apart) > near * near || dot(normal_kind.xyz, direction) >= 0.0) {
     return VPL_NONE;
   }
-  return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, vpl_id(texel, SOURCE_BOUNCE));
+  return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, vpl_id(texel, SOURCE_BOUNCE));
 }
 
 /* The patch of sky in this direction. */
@@ -92,7 +79,7 @@ Vpl candidates_sky(vec3 direction)
   vec4 place = vpl_frame.sky; /* origin, side of its tile */
   ivec2 texel = ivec2(place.xy + min(floor((0.5 + 0.5 * octahedron_encode(direction)) * place.z), place.z - 1.0));
   int id = vpl_id(texel, SOURCE_SKY);
-  return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, id);
+  return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
 }
 
 /* Radiance that the cache holds for what a ray along `direction` hit at `hit`: that of the point whose plane the hit lies
@@ -128,9 +115,9 @@ vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
   return vec3(0.0);
 }
 
-/* Irradiance / pi from the emitter that a ray from P along `direction` hit at `hit`, weighted against what the pool finds
- * of it by the balance heuristic. */
-vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
+/* Texel of the emitter's point that answers for what a ray along `direction` hit at `hit`, or -1: the hit must lie on its
+ * plane, and no farther from it than the cells around it reach. */
+ivec2 candidates_emitter(vec3 hit, vec3 direction)
 {
   vec3 place = index_place(vpl_frame.index, hit);
   for (int axis = 0; axis < 3 && vpl_frame.emitters.z > 0.0; axis++) {
@@ -139,22 +126,31 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
       continue;
     }
     ivec2 texel = index_atlas_texel(vpl_frame.emitters, point);
-    vec4 lamp = texelFetch(position_area_tx, texel, 0);
     vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
-    vec3 apart = hit - lamp.xyz;
-    float cosine = -dot(n, direction);
-    /* The hit must lie on the point's plane, and no farther from it than the cell around it reaches. */
-    if (cosine <= 0.0 || abs(dot(apart, n)) > CANDIDATES_VOXELS * voxel_grid.edge ||
-        dot(apart, apart) * vpl_frame.index.w * vpl_frame.index.w > CANDIDATES_CELLS * CANDIDATES_CELLS) {
-      continue;
+    vec3 apart = hit - texelFetch(position_area_tx, texel, 0).xyz;
+    if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_grid.edge &&
+        length(apart) * vpl_frame.index.w < CANDIDATES_CELLS) {
+      return texel;
     }
-    vec3 flux = texelFetch(flux_tx, texel, 0).rgb;
-    vec3 to_hit = hit - P;
-    float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
-    float by_pool = float(vpl_frame.candidates) * vpl_strength(flux) / (candidates_total() * lamp.w);
-    return flux / (MATH_PI * lamp.w) * (by_ray / (by_ray + by_pool));
   }
-  return vec3(0.0);
+  return ivec2(-1);
+}
+
+/* Irradiance / pi from the emitter that a ray from P along `direction` hit at `hit`, weighted against what the pool finds
+ * of it by the balance heuristic. */
+vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
+{
+  ivec2 texel = candidates_emitter(hit, direction);
+  if (texel.x < 0) {
+    return vec3(0.0);
+  }
+  float area = texelFetch(position_area_tx, texel, 0).w;
+  float cosine = -dot(texelFetch(normal_kind_tx, texel, 0).xyz, direction);
+  vec3 flux = texelFetch(flux_tx, texel, 0).rgb;
+  vec3 to_hit = hit - P;
+  float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
+  float by_pool = float(vpl_frame.candidates) * vpl_strength(flux) / (candidates_total() * area);
+  return flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
 }
 
 /* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. `carried` and
@@ -184,7 +180,14 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
     vec4 flux = texelFetch(pool_flux_tx, at, 0);
     vec4 place = texelFetch(pool_position_tx, at, 0);
     float form = vpl_form(place.xyz, place.w, octahedron_decode(facing.xy), P, N);
-    float target = vpl_strength(flux.rgb) * form;
+    vec3 toward = flux.rgb;
+#ifdef GLOSSY
+    vec4 specular = texelFetch(pool_specular_tx, at, 0);
+    if (vpl_id_kind(id) == SOURCE_BOUNCE) {
+      toward = vpl_flux_toward(toward, specular, octahedron_decode(facing.xy), normalize(P - place.xyz));
+    }
+#endif
+    float target = vpl_strength(toward) * form;
     float by_ray = facing.z * place.w * form * (1.0 / MATH_PI);
     reservoir_offer(r, id, target / max(candidates * flux.w + by_ray, 1e-30), target, u);
   }
@@ -208,9 +211,10 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
       seen = candidates_sky(direction);
     }
     float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
-    float target = vpl_strength(seen.flux) * form;
+    vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
+    float target = vpl_strength(toward) * form;
     if (seen.id != 0 && target > 0.0) {
-      float by_pool = candidates * seen.counts * vpl_strength(seen.flux) / candidates_total();
+      float by_pool = candidates * seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb)) / candidates_total();
       float by_ray = share * seen.area * form * (1.0 / MATH_PI);
       int before = r.id;
       float sum = r.sum;
@@ -228,7 +232,7 @@ vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric,
   if (r.id == 0) {
     return vec3(0.0);
   }
-  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
+  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
   if (!visible && !reach_sees(P, geometric, seen_from, vpl)) {
     return vec3(0.0);
   }

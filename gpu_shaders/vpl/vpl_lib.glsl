@@ -10,11 +10,12 @@ struct Vpl {
   float area; /* m² that it stands for */
   vec3 normal;
   vec3 flux; /* W, that leaves it diffusely */
+  vec4 specular; /* W, incident light times specular reflectance; its lobe (lobe_lib.glsl) */
   float counts; /* how much of it counts where lights are chosen by strength */
   int id;    /* its texel in the atlas and its kind; 0: none */
 };
 
-const Vpl VPL_NONE = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), 0.0, 0);
+const Vpl VPL_NONE = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), vec4(0.0), 0.0, 0);
 
 /* Texels of the atlas are below 8192. Kinds are below 31, so that no id is a NaN's bits. */
 int vpl_id(ivec2 texel, int kind)
@@ -32,12 +33,19 @@ int vpl_id_kind(int id)
   return id >> 26;
 }
 
-Vpl vpl_of_texel(sampler2D position_area_tx, sampler2D normal_kind_tx, sampler2D flux_tx, int id)
+Vpl vpl_of_texel(sampler2D position_area_tx, sampler2D normal_kind_tx, sampler2D flux_tx, sampler2D specular_tx, int id)
 {
   ivec2 texel = vpl_id_texel(id);
   vec4 place = texelFetch(position_area_tx, texel, 0);
   vec4 flux = texelFetch(flux_tx, texel, 0);
-  return Vpl(place.xyz, place.w, texelFetch(normal_kind_tx, texel, 0).xyz, flux.rgb, flux.w, id);
+  vec4 specular = vec4(0.0);
+#ifdef GLOSSY
+  /* The cache keeps its points' reflectance there. */
+  if (vpl_id_kind(id) == SOURCE_BOUNCE) {
+    specular = texelFetch(specular_tx, texel, 0);
+  }
+#endif
+  return Vpl(place.xyz, place.w, texelFetch(normal_kind_tx, texel, 0).xyz, flux.rgb, specular, flux.w, id);
 }
 
 /* One light out of many candidates: `weight` estimates 1 / the probability of `id`, from `seen` candidates. */

@@ -64,6 +64,7 @@ void main()
   out_position = vec4(0.0);
   out_normal = vec4(0.0);
   out_flux = vec4(0.0);
+  out_specular = vec4(0.0);
   float total = texelFetch(sums_tx, ivec2(pc_tiles - 1, 0), 0).y;
   if (entry >= pc_count || total <= 0.0) {
     return;
@@ -104,4 +105,5 @@ void main()
   out_position = position_area;
   out_normal = vec4(octahedron_encode(normal_kind.xyz), share, intBitsToFloat(vpl_id(cell, int(normal_kind.w))));
   out_flux = vec4(texelFetch(flux_tx, cell, 0).rgb, probability);
+  out_specular = texelFetch(specular_tx, cell, 0);
 }

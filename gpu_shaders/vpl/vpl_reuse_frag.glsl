@@ -33,7 +33,7 @@ void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], 
   if (id == 0 || stored.y <= 0.0) {
     return;
   }
-  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, id);
+  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
   float target = vpl_strength(vpl_light(vpl, at.P, at.N));
   reservoir_offer(r, id, target * stored.y * seen, target, u);
 }
@@ -107,7 +107,7 @@ void main()
   vec3 light = texelFetch(rest_tx, texel, 0).rgb;
   float weight = 0.0;
   if (r.id != 0) {
-    Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, r.id);
+    Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
     float able = 0.0;
     for (int i = 0; i < count; i++) {
       Gatherer s = sources[i].surface;

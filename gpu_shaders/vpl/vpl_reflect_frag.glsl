@@ -1,0 +1,50 @@
+/* What a glossy surface reflects to the eye: one ray along a normal that the eye sees (bxdf_sample_ggx), and what it
+ * finds there: the light that lamps' maps hold for the place, that of the cache, emitters, or the sky. */
+#include "vpl/vpl_candidates_lib.glsl"
+#include "vpl/vpl_surface_lib.glsl"
+
+/* Apart from the seeds of the candidates. */
+const int REFLECT_SEED = 2048;
+
+void main()
+{
+  ivec2 pixel = min(ivec2(gl_FragCoord.xy) * pc_stride + pc_offset, textureSize(position_tx, 0) - 1);
+  out_indirect = vec4(0.0);
+  out_direct = vec4(0.0);
+  vec3 P = texelFetch(position_tx, pixel, 0).xyz;
+  vec4 specular = texelFetch(specular_color_tx, pixel, 0);
+  if (texelFetch(position_tx, pixel, 0).w == 0.0 || specular.rgb == vec3(0.0)) {
+    return;
+  }
+  vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
+  vec3 N = octahedron_decode(packed_normals.xy);
+  vec3 geometric = octahedron_decode(packed_normals.zw);
+  vec3 V = reach_eye(P);
+  int seed = vpl_frame.seed + REFLECT_SEED;
+  vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed));
+  vec3 direction = bxdf_sample_ggx(N, V, specular.a, noise);
+  vec3 weight = bxdf_specular_weight(N, V, direction, specular.rgb, specular.a);
+  if (dot(direction, geometric) <= 0.0 || weight == vec3(0.0)) {
+    return;
+  }
+  vec3 origin = voxel_start_seen(P, geometric, V);
+  float far = voxel_trace(origin, direction, 1e30);
+  if (far < 0.0) {
+    out_direct = vec4(weight * (vpl_frame.sky.z > 0.0 ? vpl_radiance(candidates_sky(direction), -direction) : vec3(0.0)), 1.0);
+    return;
+  }
+  vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
+  ivec2 emitter = candidates_emitter(hit, direction);
+  if (emitter.x >= 0) {
+    out_direct = vec4(weight * index_radiance(position_area_tx, flux_tx, emitter), 1.0);
+  }
+  vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
+  vec3 light = candidates_carried(hit, direction, vec3(sampling_hash(pixel, seed + 2), choice.y));
+  float share;
+  int tile = candidates_lamp(choice.x, share);
+  if (tile >= 0) {
+    Vpl seen = candidates_seen(hit, direction, tile);
+    light += seen.id != 0 ? vpl_radiance(seen, -direction) / share : vec3(0.0);
+  }
+  out_indirect = vec4(weight * light, 1.0);
+}
