@@ -59,6 +59,7 @@ class Frame:
     resolved: Texture
     resolved_target: Target
     samples: int = 0
+    follows: bool = False  # whether it was restarted, not begun
     is_glossy: bool = False  # whether there may be something in the glossy targets
 
     @property
@@ -127,6 +128,7 @@ class Renderer:
     def restart(self, frame: Frame) -> None:
         """Empty a frame for another picture of its size: much quicker than to begin one."""
         frame.samples = 0  # the next sample covers the sums
+        frame.follows = True
 
     def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
         """Add one anti-aliased sample to ``frame``; yields progress 0..1 after every bounded piece of GPU work.
@@ -145,6 +147,8 @@ class Renderer:
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         self._accumulate(frame, inputs, indirect=technique is not None)
+        if technique is not None and any(view.key == settings["view"] for view in technique.views):
+            self._show(frame, inputs, technique, settings)
         yield 1.0
 
     def texture(self, frame: Frame) -> Texture:
@@ -268,6 +272,14 @@ class Renderer:
             )
         frame.samples += 1
 
+    def _show(self, frame: Frame, inputs: FrameInputs, technique: Technique, settings: Settings) -> None:
+        """Put one of the technique's views in the place of the combined pass."""
+        place = frame.light.diffuse_indirect  # whose light is in the sums already
+        technique.view(str(settings["view"]), inputs, settings.of(technique.id), place)
+        target = self.device.target([frame.sums["combined"]])
+        self.device.fullscreen(RESOLVE, target, sum_tx=place.colors[0], pc_weight=float(frame.samples))
+        self.device.free(target)
+
 
 def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameInputs:
     """Everything that the passes of the frame's next sample share."""
@@ -277,7 +289,7 @@ def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameIn
     clip_from_world = jitter @ view.clip_from_view @ view.view_from_world
     world_from_view = np.linalg.inv(view.view_from_world)
     eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
-    return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world)
+    return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world, frame.follows)
 
 
 def _new_frame(device: Device, width: int, height: int, passes: Sequence[str]) -> Frame:

@@ -14,10 +14,22 @@ SETTINGS = (
         "ENUM",
         "Method",
         "How indirect light is computed",
-        "RSM",
+        "VPL",
         items=(
             Item("NONE", "Direct Only", "No indirect light"),
             *(Item(technique.id.upper(), technique.label, technique.description) for technique in TECHNIQUES),
+        ),
+    ),
+    Setting(
+        "view",
+        "ENUM",
+        "Show",
+        "What the picture shows: itself, or what the method does",
+        "PICTURE",
+        viewport_default="PICTURE",
+        items=(
+            Item("PICTURE", "Picture", "The rendered picture"),
+            *(view for technique in TECHNIQUES for view in technique.views),
         ),
     ),
     Setting(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
 if TYPE_CHECKING:
-    from ..device.interface import Device
+    from ..device.interface import Device, Target
     from ..device.shader import Shader
     from .frame.inputs import FrameInputs, LightTargets
 
@@ -56,6 +56,7 @@ class Technique(Protocol):
     description: str
     settings: tuple[Setting, ...]
     shaders: tuple[Shader, ...]
+    views: tuple[Item, ...]  # pictures of what the technique does, in place of the rendered one; keys "<ID>_<NAME>"
 
     def __init__(self, device: Device) -> None: ...
 
@@ -67,6 +68,10 @@ class Technique(Protocol):
         ``settings`` holds this technique's values by their short names. Yields its progress (0..1) after every
         bounded piece of GPU work, so that a caller can show it and cancel between two pieces.
         """
+        ...
+
+    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
+        """Draw one of ``views`` over ``target`` (RGBA32F, of the picture's size), after ``indirect``."""
         ...
 
     def statistics(self) -> Mapping[str, float]:

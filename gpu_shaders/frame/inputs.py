@@ -62,7 +62,9 @@ class FrameInputs:
     """One sample of one frame. ``seed`` is the frame's, the same for all of its samples.
 
     ``eye`` is the camera's position and 1, or for an orthographic view the unit direction to it and 0.
-    ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer was drawn by it.
+    ``follows``: the picture follows another of the same frame, as in a viewport that moves; what was found for that may
+    be used again. ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer was
+    drawn by it.
     """
 
     gpu_scene: GpuScene
@@ -72,6 +74,7 @@ class FrameInputs:
     seed: int
     eye: tuple[float, float, float, float]
     clip_from_world: np.ndarray
+    follows: bool = False
 
     def noise_seed(self, stream: int) -> int:
         """A seed for sampling_hash(), the same for all samples: they walk along one sequence in every pixel, which

@@ -13,9 +13,9 @@ from .draws import draw_scene, material_of, visible_draws
 from .light_maps import LightMaps, MapTile
 from .lights import light_row
 from .maps import light_faces
+from .reflective_shaders import REFLECT
 from .structs import LIGHT
 from .tables import replace_table
-from .reflective_shaders import REFLECT
 
 if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
@@ -25,8 +25,9 @@ _PLACE = {"first_face": 0}
 
 
 class ReflectiveShadowMaps(LightMaps):
-    """Colour textures: position and texel area (RGBA32F); normal and kind of source (RGBA16F); diffusely reflected flux
-    in watts and how much it counts where texels are chosen by strength (RGBA32F); incident flux times specular reflectance, and its lobe (RGBA32F, lobe_lib.glsl).
+    """Colour textures: position and texel area (RGBA32F); normal and SourceKind (RGBA16F); diffusely reflected flux in
+    watts, and how much it counts where texels are chosen by strength (RGBA32F); incident flux times specular
+    reflectance, and its lobe (RGBA32F, lobe_lib.glsl).
 
     All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
     """

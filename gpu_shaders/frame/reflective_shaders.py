@@ -7,7 +7,6 @@ from .shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
 from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 
-
 class SourceKind(IntEnum):
     """What a texel of an atlas of light sources stands for, in its normal's fourth channel; 0: nothing."""
 

@@ -128,6 +128,7 @@ class Rsm:
     description = "One diffuse bounce from what each light sees; off-screen light included, no occlusion of the bounce"
     settings = SETTINGS
     shaders = SHADERS
+    views = ()
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -156,6 +157,9 @@ class Rsm:
         reused = self._interpolate(inputs, coarse, target, stride, offset)
         for done in self._gather(inputs, settings, target, reused, 1, (0, 0)):
             yield COARSE_DONE + (1.0 - COARSE_DONE) * done
+
+    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
+        raise KeyError(key)
 
     def statistics(self) -> Mapping[str, float]:
         atlas = self.maps.atlas

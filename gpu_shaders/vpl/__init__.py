@@ -1,7 +1,17 @@
-"""Virtual point lights, resampled: one bounce and more of all lights, with visibility, at a cost that knows no lights.
+"""Virtual point lights, resampled: bounced light with visibility, at a cost that does not grow with the lights.
 
-A. Keller, "Instant Radiosity", SIGGRAPH 1997; B. Bitterli et al., "Spatiotemporal reservoir resampling for real-time ray
-tracing with dynamic direct lighting", SIGGRAPH 2020.
+A. Keller, "Instant Radiosity", SIGGRAPH 1997; B. Bitterli et al., "Spatiotemporal reservoir resampling for real-time
+ray tracing with dynamic direct lighting", SIGGRAPH 2020.
+
+1. Draw what every lamp lights, and points of what emits, into one atlas of sources (``sources``).
+2. Mark the voxels that the scene occupies (``frame.voxels``).
+3. Choose a pool of virtual lights from the atlas in proportion to their strength (``pool``).
+4. Points of the surfaces gather from the pool, for further bounces (``cache``, ``index``).
+5. Some of the pixels gather: entries of the pool and a ray, one of them chosen and tested for visibility; reservoirs are
+   reused over space and time, the result filtered and brought to all pixels (``gather``).
+6. Glossy pixels follow one reflected ray.
+
+Limits: docs/vpl.md.
 """
 
 from __future__ import annotations
@@ -9,169 +19,35 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ...device.interface import Device
+import numpy as np
+
+from ...device.interface import Device, Target
+from ...scene.data import Scene
 from ..frame.inputs import FrameInputs, LightTargets
-from ..frame.voxels import Voxels
-from ..technique import Item, Setting, Value
 from ..frame.reflective_shaders import SourceKind
+from ..frame.voxels import Voxels
+from ..technique import Item, Value
 from .cache import Cache
 from .gather import Gathering, PoolState
 from .index import PointIndex
 from .pool import Pool
-from .shaders import SHADERS
-from .structs import VPL_FRAME
+from .settings import SETTINGS
+from .shaders import SHADERS, VIEW_VOXELS
 from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
+from .structs import VPL_FRAME
 
 # How far a sample is after each step, for the progress bar.
 MAPS_DONE, VOXELS_DONE, CACHE_DONE = 0.2, 0.4, 0.6
-# Updates of the cache before the first picture, each of which takes light a bounce further.
-WARM_UP = 12
-# Where light goes on, so many updates of a point after a change are forgotten at once, for they lack light of further
-# bounces; then its mean is of this newer part of them.
-FORGOTTEN, NEWER = 4, 0.5
+# Before a picture that follows none the cache is updated until so much of all light is left that goes on, and within
+# these limits: each update takes light a bounce further.
+LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
+# Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
+# part of them.
+NEWER = 0.5
+# Updates after which no more points come to light that had none, so that the index of them stays as it is.
+COME_TO_LIGHT = 4.0
 ALL_KINDS = sum(1 << kind for kind in SourceKind)
 FIRST_HAND = 1 << SourceKind.EMISSION | 1 << SourceKind.SKY  # light of which the cache's points send the first bounce
-
-SETTINGS = (
-    Setting(
-        "scale",
-        "ENUM",
-        "Resolution",
-        "Pixels that gather bounced light for themselves; the others take it from those around that lie on the same "
-        "surface. Coarser is faster, at the cost of detail in the bounce on small and curved things",
-        "HALF",
-        viewport_default="QUARTER",
-        items=(
-            Item("FULL", "1:1", "Every pixel"),
-            Item("HALF", "1:2", "Every second pixel of every second row"),
-            Item("QUARTER", "1:4", "Every fourth pixel of every fourth row"),
-            Item("EIGHTH", "1:8", "Every eighth pixel of every eighth row"),
-        ),
-    ),
-    Setting(
-        "resolution",
-        "INT",
-        "Map Resolution",
-        "Texels along a side of each light's map. Higher keeps small and touching surfaces apart, at the cost of "
-        "memory and of time when lights or objects move",
-        256,
-        viewport_default=256,
-        minimum=64,
-        maximum=2048,
-        unit="texels",
-    ),
-    Setting(
-        "pool",
-        "INT",
-        "Virtual Lights",
-        "Virtual point lights chosen from all sources for each sample. More is less alike noise in neighbouring "
-        "pixels, at the cost of time that does not depend on the picture's size",
-        8192,
-        viewport_default=4096,
-        minimum=64,
-        maximum=262144,
-        unit="lights",
-    ),
-    Setting(
-        "candidates",
-        "INT",
-        "Candidates",
-        "Virtual lights that a pixel looks at in one sample before it traces a ray to one of them. More is less noise "
-        "a sample, at the cost of time",
-        16,
-        viewport_default=8,
-        minimum=1,
-        maximum=1024,
-        unit="lights",
-    ),
-    Setting(
-        "bounces",
-        "ENUM",
-        "Bounces",
-        "How often light is reflected before it reaches what the camera sees",
-        "ONE",
-        items=(
-            Item("ONE", "1", "Light that was reflected once: quickest, and darker than life in closed rooms"),
-            Item("MANY", "Many", "Light goes on until nothing is left of it, at the cost of time"),
-        ),
-    ),
-    Setting(
-        "cache_rows",
-        "INT",
-        "Cache Updates",
-        "How many 64ths of the points that hold light for further bounces gather in each sample. More follows changes "
-        "sooner and is calmer, at the cost of time",
-        64,
-        viewport_default=4,
-        minimum=1,
-        maximum=64,
-        unit="rows of 64 points",
-    ),
-    Setting(
-        "voxels",
-        "INT",
-        "Voxels",
-        "Voxels along the longest side of the scene, through which rays test what is hidden. More keeps thin gaps and "
-        "contacts open, at the cost of memory and of time when objects move",
-        512,
-        viewport_default=256,
-        minimum=64,
-        maximum=1024,
-        unit="voxels",
-    ),
-    Setting(
-        "reuse",
-        "BOOL",
-        "Reuse",
-        "Keep what the picture before has found, where it shows the same surfaces. On is calm from the first pictures of a "
-        "moving view, and light lags behind by some pictures; off knows nothing of other pictures",
-        False,
-        viewport_default=True,
-    ),
-    Setting(
-        "denoise",
-        "BOOL",
-        "Denoise",
-        "Smooth the bounced light of neighbouring pixels of one surface as far as its noise goes. On is clean at once; "
-        "off keeps the noise, and the finest detail",
-        False,
-        viewport_default=True,
-    ),
-    Setting(
-        "bound",
-        "BOOL",
-        "Bound",
-        "Take a virtual light for a disc of the size that it stands for. Off takes it for a point: contacts are a "
-        "little brighter, and much noisier",
-        True,
-    ),
-    Setting(
-        "lobe",
-        "FLOAT",
-        "Least Roughness of Bounces",
-        "Glossy surfaces send light on as if they were at least this rough. Lower is truer to caustics, and noisier; "
-        "higher spreads them",
-        0.25,
-        minimum=0.0,
-        maximum=1.0,
-    ),
-    Setting(
-        "occlusion",
-        "ENUM",
-        "Occlusion",
-        "What blocks bounced light",
-        "CONTACTS",
-        items=(
-            Item("NONE", "Nothing", "Light passes walls: to see what occlusion changes"),
-            Item("VOXELS", "Voxels", "All of the scene, as coarse as its voxels"),
-            Item(
-                "CONTACTS",
-                "Voxels and Contacts",
-                "All of the scene, and what the camera sees closer than the voxels can tell, at the cost of some time",
-            ),
-        ),
-    ),
-)
 
 
 class Vpl:
@@ -182,6 +58,11 @@ class Vpl:
     description = "Bounced light of all lights, emissive surfaces and the sky, with occlusion, from one resampled pool"
     settings = SETTINGS
     shaders = SHADERS
+    views = (
+        Item("VPL_BOUND", "Bound", "Light that is lost because virtual lights are discs, not points"),
+        Item("VPL_VOXELS", "Voxels", "The voxels that block bounced light, as the camera sees them"),
+        Item("VPL_HISTORY", "History", "From red to green: how many samples the light of a pixel is the mean of"),
+    )
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -193,15 +74,19 @@ class Vpl:
         self._sorted = -1  # revision of the sources that the indices were made for
         self.gathering = Gathering(device)
         self._picture = 0  # number of the sample in its sequence of noise
-        self._cache_updates = 0.0  # of every point since the scene changed
+        self._cache_updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
         self._cache_revision = -1  # of the scene that the cache last gathered in
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """See ``Technique.indirect``."""
         gpu_scene = inputs.gpu_scene
+        if inputs.sample == 0 and not (inputs.follows and settings["reuse"]):
+            self._forget()
         # Noise goes on from picture to picture where they are averaged, else every picture has the same.
         self._picture = self._picture + 1 if settings["reuse"] else inputs.sample
-        for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache=self._wants_cache(inputs, settings)):
+        for done in self.sources.update_all(
+            gpu_scene, int(settings["resolution"]), with_cache=self._wants_cache(inputs, settings)
+        ):
             yield MAPS_DONE * done
         if not self.sources.tiles:
             return
@@ -213,6 +98,25 @@ class Vpl:
         about = PoolState(self._picture, self.sources.revision)
         for done in self.gathering.draw(inputs, settings, candidates, about, targets):
             yield CACHE_DONE + (1.0 - CACHE_DONE) * done
+
+    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
+        """See ``Technique.view``."""
+        if not self.sources.tiles:
+            self.device.clear(target)
+        elif key == "VPL_HISTORY":
+            self.gathering.view_history(settings, target)
+        elif key == "VPL_BOUND":
+            candidates = self._candidates(inputs, settings, kinds=ALL_KINDS, number=self._picture)
+            self.gathering.view_bound(inputs, settings, candidates, target)
+        else:
+            world_from_clip = np.linalg.inv(inputs.clip_from_world)
+            self.device.fullscreen(VIEW_VOXELS, target, **self.voxels.bindings(), pc_world_from_clip=world_from_clip)
+
+    def _forget(self) -> None:
+        """Begin a picture that knows nothing of those before it."""
+        self._picture, self._cache_revision = 0, -1
+        self.cache.forget()
+        self.gathering.forget()
 
     def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
         """Whether some light's first or further bounces come from the cache."""
@@ -231,12 +135,13 @@ class Vpl:
             self.pool.draw(self.sources, count, seed)
             return
         many = settings["bounces"] == "MANY"
+        bounces = _bounces(inputs.gpu_scene.scene) if many else 1
         rounds, rows = 1, int(settings["cache_rows"])
         if self._cache_revision < 0:
-            rounds, rows = (WARM_UP if many else 1), POINTS_SIDE
+            rounds, rows = bounces, POINTS_SIDE
         if self._cache_revision != inputs.gpu_scene.revision:
             self._cache_revision = inputs.gpu_scene.revision
-            self._cache_updates = float(FORGOTTEN - rounds) if many else 0.0
+            self._cache_updates = float(1 - bounces)
         for number in range(rounds):
             self.cache.emit(self.sources, tile)
             self.pool.draw(self.sources, count, seed + number)
@@ -244,11 +149,11 @@ class Vpl:
                 inputs,
                 settings,
                 kinds=ALL_KINDS if many else FIRST_HAND,
-                number=WARM_UP * self._picture + number,
+                number=MOST_WARM_UP * self._picture + number,
             )
-            counting = max(self._cache_updates - FORGOTTEN, 0.0) * NEWER if many else self._cache_updates
+            counting = max(self._cache_updates, 0.0) * (NEWER if many else 1.0)
             self.cache.gather(self.sources, tile, candidates, rows, counting, inputs.gpu_scene.is_glossy)
-            if self._cache_updates < 2 * FORGOTTEN:  # points come to light
+            if self._cache_updates < COME_TO_LIGHT:
                 self.cache.emit(self.sources, tile)
                 self._sort_points()
             self._cache_updates += rows / POINTS_SIDE
@@ -325,3 +230,11 @@ class Vpl:
             **self.voxels.bindings(),
             "vpl_frame": VPL_FRAME.pack([frame], for_uniform=True),
         }
+
+
+def _bounces(scene: Scene) -> int:
+    """After how many bounces light is all but gone, by the mean reflectance of what there is."""
+    used = [m for instance in scene.instances for m in instance.materials]
+    means = [float(np.mean(np.maximum(scene.materials[m].base_color, scene.materials[m].specular))) for m in used]
+    mean = min(max(float(np.mean(means)) if means else 0.0, 0.01), 0.99)
+    return int(np.clip(np.ceil(np.log(LEFT) / np.log(mean)), LEAST_WARM_UP, MOST_WARM_UP))

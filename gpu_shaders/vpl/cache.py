@@ -1,8 +1,7 @@
 """The radiance cache: points of the scene's surfaces that gather from the pool and send what they reflect back to it.
 
-A point's light is a mean over many samples, so the cache is calm where a path that goes on for many bounces is not
-(Keller 1997 continues paths; Krivanek et al. 2005 cache). Each sample takes light one bounce further, with the surfaces'
-reflectance as its gain, which is below 1.
+A point's light is a mean over many samples, so the cache is calm where a path that goes on for many bounces is not. Each
+update takes light one bounce further, with the surfaces' reflectance, below 1, as its gain.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Gathering at some of the pixels: candidates, their reuse over space and time, a filter, and the way up to all pixels."""
+"""Gathering at some of the pixels: candidates, reuse over space and time, a filter, and the way up to all pixels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
-from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, REFLECT, REUSE, UPSAMPLE
+from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, REFLECT, REUSE, UPSAMPLE, VIEW_BOUND, VIEW_HISTORY
 from .structs import OLD_VIEW
 
 STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
@@ -44,7 +44,7 @@ class _Grid:
 
     size: tuple[int, int]
     surfaces: list[Texture]
-    gathered: tuple[Texture, Texture]
+    gathered: list[Texture]
     reservoirs: list[Texture]
     histories: list[Texture]
     noisy: list[Texture]
@@ -57,7 +57,15 @@ class _Grid:
     @property
     def resources(self) -> tuple[Texture | Target, ...]:
         targets = (*self.gather_targets, *self.reuse_targets, *self.noisy_targets, self.reflect_target)
-        return (*targets, *self.surfaces, *self.gathered, *self.reservoirs, *self.histories, *self.noisy, *self.reflected)
+        return (
+            *targets,
+            *self.surfaces,
+            *self.gathered,
+            *self.reservoirs,
+            *self.histories,
+            *self.noisy,
+            *self.reflected,
+        )
 
     def turn(self) -> None:
         """Make what is newest the picture before."""
@@ -102,7 +110,10 @@ class Gathering:
         about: PoolState,
         targets: LightTargets,
     ) -> Iterator[float]:
-        """Add this sample's light to ``targets``; yields progress. ``candidates``: what vpl_candidates_lib.glsl reads."""
+        """Add this sample's light to ``targets``; yields progress.
+
+        ``candidates``: what vpl_candidates_lib.glsl reads.
+        """
         stride = STRIDES[str(settings["scale"])]
         offset = _offset(inputs.seed, about.number, stride)
         grid = self._fitting(inputs, stride)
@@ -116,9 +127,7 @@ class Gathering:
             pc_offset=offset,
         )
         yield GATHER_DONE
-        size = (inputs.view.width, inputs.view.height)
-        revision = inputs.gpu_scene.revision
-        now = _Before(inputs.clip_from_world, size, offset, stride, revision, about.sources_revision)
+        now = self._now(inputs, stride, offset, about.sources_revision)
         if reuses:
             self._reuse(inputs, grid, candidates, now)
             light = self._filtered(grid) if settings["denoise"] else grid.noisy[0]
@@ -131,6 +140,35 @@ class Gathering:
             self._reflect(inputs, settings, candidates, grid, now, targets)
         self._before = now if reuses else None
 
+    def view_bound(
+        self, inputs: FrameInputs, settings: Mapping[str, Value], candidates: Mapping[str, Any], target: Target
+    ) -> None:
+        """Draw the light that the bound takes away, as this sample found it."""
+        stride = STRIDES[str(settings["scale"])]
+        assert self._grid is not None
+        grid, now = self._grid, self._now(inputs, stride, (0, 0), -1)
+        self.device.fullscreen(
+            VIEW_BOUND,
+            grid.gather_targets[0],
+            normal_tx=inputs.gbuffer.normal,
+            **candidates,
+            pc_stride=stride,
+            pc_offset=now.offset,
+        )
+        self.device.clear(target)
+        self._upsample(inputs, now, grid, grid.gathered[0], target)
+
+    def view_history(self, settings: Mapping[str, Value], target: Target) -> None:
+        """Draw how many samples each pixel's mean stands for."""
+        assert self._grid is not None
+        stride = STRIDES[str(settings["scale"])]
+        history = self._grid.histories[0]
+        self.device.fullscreen(VIEW_HISTORY, target, history_tx=history, pc_stride=stride, pc_many=LONG_HISTORY)
+
+    def forget(self) -> None:
+        """Know nothing of the picture before."""
+        self._before = None
+
     def free(self) -> None:
         for resource in self._grid.resources if self._grid else ():
             self.device.free(resource)
@@ -141,7 +179,9 @@ class Gathering:
         history = reuse = 0.0
         if before is not None:
             still = inputs.sample > 0
-            history = ENDLESS if still else LONG_HISTORY if before.scene_revision == now.scene_revision else SHORT_HISTORY
+            history = (
+                ENDLESS if still else LONG_HISTORY if before.scene_revision == now.scene_revision else SHORT_HISTORY
+            )
             # Samples of a still view are to be independent, or their mean would converge more slowly.
             reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
         self.device.fullscreen(
@@ -202,6 +242,10 @@ class Gathering:
             pc_offset=now.offset,
         )
 
+    def _now(self, inputs: FrameInputs, stride: int, offset: tuple[int, int], sources_revision: int) -> _Before:
+        size = (inputs.view.width, inputs.view.height)
+        return _Before(inputs.clip_from_world, size, offset, stride, inputs.gpu_scene.revision, sources_revision)
+
     def _fitting(self, inputs: FrameInputs, stride: int) -> _Grid:
         """The grid of this picture's size, turned so that the picture before is the older of each pair."""
         size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
@@ -222,7 +266,7 @@ def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
     def pair() -> list[Texture]:
         return [device.texture(size, "RGBA32F") for _ in range(2)]
 
-    surfaces, gathered, reservoirs, histories, noisy, reflected = pair(), tuple(pair()), pair(), pair(), pair(), pair()
+    surfaces, gathered, reservoirs, histories, noisy, reflected = pair(), pair(), pair(), pair(), pair(), pair()
     # Reuse writes the first of the noisy pair; the filter goes to and fro between both.
     return _Grid(
         size,

@@ -37,7 +37,9 @@ class PointIndex:
         shared |= {"pc_origin": (x, y), "pc_side": side}
         target = self._grids[0][1]
         self.device.clear(target)
-        with self.device.drawing(INDEX_SCATTER, target, normal_kind_tx=sources.colors[1], flux_tx=sources.colors[2], **shared) as draw:
+        with self.device.drawing(
+            INDEX_SCATTER, target, normal_kind_tx=sources.colors[1], flux_tx=sources.colors[2], **shared
+        ) as draw:
             draw(count=9 * side * side)
         for _ in range(SPREAD):
             (old, _), (_, target) = self._grids

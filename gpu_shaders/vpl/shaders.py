@@ -120,6 +120,23 @@ GATHER = {
     (True, True): _gather("vpl_gather_to_reuse_glossy", (*_REUSE, *_GLOSSY)),
 }
 
+VIEW_BOUND = _gather("vpl_view_bound", (("BOUND_VIEW", "1"),))
+VIEW_VOXELS = Shader(
+    name="vpl_view_voxels",
+    fragment="vpl/vpl_view_voxels_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers=VOXEL_SAMPLERS,
+    uniforms={"voxel_grid": VOXEL_GRID},
+    constants={"pc_world_from_clip": "MAT4"},
+)
+VIEW_HISTORY = Shader(
+    name="vpl_view_history",
+    fragment="vpl/vpl_view_history_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers={"history_tx": "FLOAT_2D"},
+    constants={"pc_stride": "INT", "pc_many": "FLOAT"},
+)
+
 REFLECT = Shader(
     name="vpl_reflect",
     fragment="vpl/vpl_reflect_frag.glsl",
@@ -130,6 +147,7 @@ REFLECT = Shader(
     constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
     defines=(*_DEFINES, *_LIGHTS, *_GLOSSY),
 )
+
 
 def _reuse(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
     return Shader(
@@ -181,7 +199,7 @@ INDEX_SCATTER = Shader(
     fragment="vpl/vpl_index_scatter_frag.glsl",
     varyings={"v_point": "flat INT"},
     outputs={"out_point": "VEC4"},
-    samplers=ATLAS_SAMPLERS,
+    samplers={"position_area_tx": "FLOAT_2D", "normal_kind_tx": "FLOAT_2D", "flux_tx": "FLOAT_2D"},
     constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT"},
     defines=_INDEX,
 )
@@ -202,6 +220,7 @@ CACHE_FADE = Shader(
     samplers={"sum_tx": "FLOAT_2D"},
     constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
 )
+
 
 def _cache_gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
     return Shader(
@@ -238,6 +257,9 @@ SHADERS = (
     TILES,
     POOL,
     *GATHER.values(),
+    VIEW_BOUND,
+    VIEW_VOXELS,
+    VIEW_HISTORY,
     REFLECT,
     *REUSE.values(),
     ATROUS,

@@ -214,7 +214,8 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
     vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
     float target = vpl_strength(toward) * form;
     if (seen.id != 0 && target > 0.0) {
-      float by_pool = candidates * seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb)) / candidates_total();
+      float by_pool =
+          candidates * seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb)) / candidates_total();
       float by_ray = share * seen.area * form * (1.0 / MATH_PI);
       int before = r.id;
       float sum = r.sum;

@@ -23,6 +23,13 @@ void main()
   Reservoir r = candidates_choose(P, N, geometric, seen_from, pixel, 0, visible, carried, emitted);
   vec3 light = candidates_light(r, visible, P, N, geometric, seen_from);
   out_surface = surface_pack(P, N);
+#ifdef BOUND_VIEW
+  /* What 1 / d^2 would give more than 1 / (d^2 + A / pi). */
+  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
+  vec3 d = vpl.position - P;
+  out_indirect = vec4(light * vpl.area / (MATH_PI * max(dot(d, d), 1e-20)), 1.0);
+  return;
+#endif
 #ifdef REUSE
   bool lit = any(greaterThan(light, vec3(0.0)));
   out_indirect = vec4(intBitsToFloat(r.id), lit ? r.sum / r.target : 0.0, 1.0, 0.0);

@@ -2,7 +2,7 @@
  * the ways that surfaces face. `cube` is its lower corner and cells a metre. A flat texture has the six
  * sides side by side, and the cells' layers one above the other. */
 
-const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX * VPL_INDEX);
+const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX *VPL_INDEX);
 
 /* In cells. */
 vec3 index_place(vec4 cube, vec3 P)

@@ -9,10 +9,10 @@ struct Vpl {
   vec3 position;
   float area; /* m² that it stands for */
   vec3 normal;
-  vec3 flux; /* W, that leaves it diffusely */
+  vec3 flux;     /* W, that leaves it diffusely */
   vec4 specular; /* W, incident light times specular reflectance; its lobe (lobe_lib.glsl) */
-  float counts; /* how much of it counts where lights are chosen by strength */
-  int id;    /* its texel in the atlas and its kind; 0: none */
+  float counts;  /* how much of it counts where lights are chosen by strength */
+  int id;        /* its texel in the atlas and its kind; 0: none */
 };
 
 const Vpl VPL_NONE = Vpl(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), vec4(0.0), 0.0, 0);
@@ -51,7 +51,7 @@ Vpl vpl_of_texel(sampler2D position_area_tx, sampler2D normal_kind_tx, sampler2D
 /* One light out of many candidates: `weight` estimates 1 / the probability of `id`, from `seen` candidates. */
 struct Reservoir {
   int id;
-  float sum; /* of the candidates' weights */
+  float sum;    /* of the candidates' weights */
   float target; /* strength of the chosen one's light at the receiver */
   float seen;
 };

@@ -13,27 +13,27 @@ float pool_stir(float rest, int entry, int level)
 
 /* Take one of the cells in [first, end) of one level in proportion to its strength. `u` in [0, 1) chooses; it is
  * rescaled to what is left of it. */
-#define POOL_CHOOSE(STRENGTH) \
-  { \
-    float sum = 0.0; \
-    for (int y = first.y; y < end.y; y++) { \
-      for (int x = first.x; x < end.x; x++) { \
-        sum += STRENGTH(ivec2(x, y)); \
-      } \
-    } \
-    float left = u * sum; \
-    bool found = false; \
-    for (int y = first.y; y < end.y; y++) { \
-      for (int x = first.x; x < end.x; x++) { \
-        float part = STRENGTH(ivec2(x, y)); \
-        if (!found && part > 0.0) { \
-          cell = ivec2(x, y); \
-          u = clamp(left / part, 0.0, 0.99999994); \
-          found = left < part; \
-        } \
-        left -= found ? 0.0 : part; \
-      } \
-    } \
+#define POOL_CHOOSE(STRENGTH)                                                                                          \
+  {                                                                                                                    \
+    float sum = 0.0;                                                                                                   \
+    for (int y = first.y; y < end.y; y++) {                                                                            \
+      for (int x = first.x; x < end.x; x++) {                                                                          \
+        sum += STRENGTH(ivec2(x, y));                                                                                  \
+      }                                                                                                                \
+    }                                                                                                                  \
+    float left = u * sum;                                                                                              \
+    bool found = false;                                                                                                \
+    for (int y = first.y; y < end.y; y++) {                                                                            \
+      for (int x = first.x; x < end.x; x++) {                                                                          \
+        float part = STRENGTH(ivec2(x, y));                                                                            \
+        if (!found && part > 0.0) {                                                                                    \
+          cell = ivec2(x, y);                                                                                          \
+          u = clamp(left / part, 0.0, 0.99999994);                                                                     \
+          found = left < part;                                                                                         \
+        }                                                                                                              \
+        left -= found ? 0.0 : part;                                                                                    \
+      }                                                                                                                \
+    }                                                                                                                  \
   }
 
 #define POOL_COARSE(texel) texelFetch(coarse_tx, texel, 0).r

@@ -30,7 +30,8 @@ void main()
   vec3 origin = voxel_start_seen(P, geometric, V);
   float far = voxel_trace(origin, direction, 1e30);
   if (far < 0.0) {
-    out_direct = vec4(weight * (vpl_frame.sky.z > 0.0 ? vpl_radiance(candidates_sky(direction), -direction) : vec3(0.0)), 1.0);
+    vec3 sky = vpl_frame.sky.z > 0.0 ? vpl_radiance(candidates_sky(direction), -direction) : vec3(0.0);
+    out_direct = vec4(weight * sky, 1.0);
     return;
   }
   vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;

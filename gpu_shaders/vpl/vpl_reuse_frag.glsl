@@ -23,8 +23,8 @@ struct Source {
   float seen;
 };
 
-void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], int number, Gatherer surface, vec4 stored,
-                 float most, Gatherer at, inout float u)
+void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], int number, Gatherer surface,
+                 vec4 stored, float most, Gatherer at, inout float u)
 {
   float seen = min(stored.z, most);
   sources[number] = Source(surface, seen);
