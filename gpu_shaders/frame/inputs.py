@@ -63,8 +63,8 @@ class FrameInputs:
 
     ``eye`` is the camera's position and 1, or for an orthographic view the unit direction to it and 0.
     ``follows``: the picture follows another of the same frame, as in a viewport that moves; what was found for that may
-    be used again. ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer was
-    drawn by it.
+    be used again. ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer
+    was drawn by it.
     """
 
     gpu_scene: GpuScene

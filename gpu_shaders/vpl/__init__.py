@@ -7,8 +7,8 @@ ray tracing with dynamic direct lighting", SIGGRAPH 2020.
 2. Mark the voxels that the scene occupies (``frame.voxels``).
 3. Choose a pool of virtual lights from the atlas in proportion to their strength (``pool``).
 4. Points of the surfaces gather from the pool, for further bounces (``cache``, ``index``).
-5. Some of the pixels gather: entries of the pool and a ray, one of them chosen and tested for visibility; reservoirs are
-   reused over space and time, the result filtered and brought to all pixels (``gather``).
+5. Some of the pixels gather: entries of the pool and a ray, one of them chosen and tested for visibility; reservoirs
+   are reused over space and time, the result filtered and brought to all pixels (``gather``).
 6. Glossy pixels follow one reflected ray.
 
 Limits: docs/vpl.md.

@@ -1,7 +1,7 @@
 """The radiance cache: points of the scene's surfaces that gather from the pool and send what they reflect back to it.
 
-A point's light is a mean over many samples, so the cache is calm where a path that goes on for many bounces is not. Each
-update takes light one bounce further, with the surfaces' reflectance, below 1, as its gain.
+A point's light is a mean over many samples, so the cache is calm where a path that goes on for many bounces is not.
+Each update takes light one bounce further, with the surfaces' reflectance, below 1, as its gain.
 """
 
 from __future__ import annotations

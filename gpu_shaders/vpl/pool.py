@@ -1,7 +1,7 @@
 """The pool: some thousand virtual point lights of all sources, chosen anew in every sample in proportion to strength.
 
-P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005 (hierarchical warping). What a gather costs depends on the
-pool's size and on the pixels, not on how many lights there are.
+P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005 (hierarchical warping). What a gather costs depends on
+the pool's size and on the pixels, not on how many lights there are.
 """
 
 from __future__ import annotations

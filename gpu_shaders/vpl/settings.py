@@ -93,8 +93,8 @@ SETTINGS = (
         "reuse",
         "BOOL",
         "Reuse",
-        "Keep what the picture before has found, where it shows the same surfaces. On is calm from the first pictures of a "
-        "moving view, and light lags behind by some pictures; off knows nothing of other pictures",
+        "Keep what the picture before has found, where it shows the same surfaces. On is calm from the first pictures "
+        "of a moving view, and light lags behind by some pictures; off knows nothing of other pictures",
         False,
         viewport_default=True,
     ),
