@@ -147,7 +147,7 @@ class Renderer:
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         self._accumulate(frame, inputs, indirect=technique is not None)
-        if technique is not None and any(view.key == settings["view"] for view in technique.views):
+        if technique is not None and any(view.key == settings["show"] for view in technique.views):
             self._show(frame, inputs, technique, settings)
         yield 1.0
 
@@ -275,7 +275,7 @@ class Renderer:
     def _show(self, frame: Frame, inputs: FrameInputs, technique: Technique, settings: Settings) -> None:
         """Put one of the technique's views in the place of the combined pass."""
         place = frame.light.diffuse_indirect  # whose light is in the sums already
-        technique.view(str(settings["view"]), inputs, settings.of(technique.id), place)
+        technique.view(str(settings["show"]), inputs, settings.of(technique.id), place)
         target = self.device.target([frame.sums["combined"]])
         self.device.fullscreen(RESOLVE, target, sum_tx=place.colors[0], pc_weight=float(frame.samples))
         self.device.free(target)

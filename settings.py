@@ -21,7 +21,7 @@ SETTINGS = (
         ),
     ),
     Setting(
-        "view",
+        "show",
         "ENUM",
         "Show",
         "What the picture shows: itself, or what the method does",

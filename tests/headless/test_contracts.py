@@ -33,7 +33,7 @@ def variations():
     """Settings that differ from the defaults in one: every choice, every lower limit, the upper one of a number."""
     yield {}
     for name, setting in named_settings():
-        if name == "samples":  # counted by the caller of the renderer
+        if name in ("samples", "show"):  # counted by the caller of the renderer; in place of the picture
             continue
         values = [setting.minimum]
         if setting.kind == "ENUM":
@@ -108,12 +108,27 @@ def test_scene_without_meshes_or_lights_is_drawn(studio, shown):
     np.testing.assert_allclose(found["environment"][0, 0], (1, 2, 3))
 
 
+VIEWS_OF = [(technique.id.upper(), view.key) for technique in TECHNIQUES for view in technique.views]
+
+
+@pytest.mark.parametrize(("method", "view"), VIEWS_OF, ids=str)
+def test_views_show_something_else_at_any_size(studio, method, view):
+    reuse = {f"{method.lower()}_reuse": True}
+    for place in VIEWS.values():
+        picture = studio.render(SCENE, place, 2, ALL, method=method, **reuse)
+        shown = studio.render(SCENE, place, 2, ALL, method=method, show=view, **reuse)
+        assert np.isfinite(shown["combined"]).all()
+        same({"diffuse_direct": shown["diffuse_direct"]}, {"diffuse_direct": picture["diffuse_direct"]})
+    assert (shown["combined"] != picture["combined"]).any()
+
+
 def test_method_none_runs_no_technique(headless_device):
     studio = Studio(headless_device)
-    found = studio.render(SCENE, VIEWS["orthographic"], 1, ALL, method="NONE")
+    lamps_only = replace(SCENE, world=World())  # a world's light comes from the technique
+    found = studio.render(lamps_only, VIEWS["orthographic"], 1, ALL, method="NONE")
     assert not found["diffuse_indirect"].any() and found["diffuse_direct"].any()
     assert not [name for name in studio.renderer.statistics() if name.startswith("rsm")]
-    with_bounce = studio.render(SCENE, VIEWS["orthographic"], 1, ALL)
+    with_bounce = studio.render(lamps_only, VIEWS["orthographic"], 1, ALL)
     same({"diffuse_direct": with_bounce["diffuse_direct"]}, {"diffuse_direct": found["diffuse_direct"]})
     studio.render(SCENE, VIEWS["orthographic"], 1, method="NONE")
     assert not [name for name in studio.renderer.statistics() if name.startswith("rsm")]  # its memory is given back
@@ -133,9 +148,9 @@ def test_passes_add_up_to_combined(studio, glossy):
 
 def test_transparent_film_and_holdout_leave_holes(studio):
     view = ortho(30, 30, 6, (0, 0, 10))
-    opaque = studio.render(SCENE, view, 4, ALL)
+    opaque = studio.render(SCENE, view, 4, ALL, method="NONE")
     assert (opaque["combined"][..., 3] == 1).all()
-    clear = studio.render(replace(SCENE, film_transparent=True), view, 4, ALL)
+    clear = studio.render(replace(SCENE, film_transparent=True), view, 4, ALL, method="NONE")
     assert (clear["combined"][0] == 0).all() and not clear["environment"].any()
     assert (clear["combined"][14, 22] == opaque["combined"][14, 22]).all()  # floor
     edge = clear["combined"][15, :, 3]
@@ -143,7 +158,7 @@ def test_transparent_film_and_holdout_leave_holes(studio):
 
     visibility = {"box": Visibility.HOLDOUT | Visibility.SHADOW | Visibility.BOUNCE}
     holed = scene(MESHES, LAMPS, (0.8, 0.5, 0.2), visibility=visibility, film_transparent=True)
-    found = studio.render(holed, view, 4, ALL)
+    found = studio.render(holed, view, 4, ALL, method="NONE")
     assert (found["combined"][15, 15] == 0).all()
     same({"combined": found["combined"][14, 21:23]}, {"combined": clear["combined"][14, 21:23]})
 

@@ -34,7 +34,7 @@ def bounce(studio, picture, view, samples=1, **settings):
     """Indirect irradiance in W/m² of a grey scene, (h, w), and the positions."""
     settings = {"estimator": "ALL_TEXELS", "resolution": 64, **settings}
     values = {f"rsm_{name}": value for name, value in settings.items()}
-    found = studio.render(picture, view, samples, ["diffuse_indirect", "position"], **values)
+    found = studio.render(picture, view, samples, ["diffuse_indirect", "position"], method="RSM", **values)
     return math.pi * found["diffuse_indirect"][..., 0], found["position"]
 
 

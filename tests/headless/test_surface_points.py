@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rebound.gpu_shaders.frame.reflective_shaders import SourceKind
 from rebound.gpu_shaders.frame.surface_points import SIDES, SurfacePoints
 from rebound.scene.data import Image, Material, Mesh, Texture, Visibility
 from rebound.tests.support.render_scenes import Studio, aimed, box, place, quad, scene, sphere, triangles
@@ -122,7 +123,7 @@ def test_normals_are_unit_and_on_both_sides(either):
     found = either.draw(picture())
     normal, position = found["normal"], found["position_area"][:, :3]
     np.testing.assert_allclose(np.linalg.norm(normal[:, :3], axis=1), 1, atol=2e-3)
-    assert (normal[:, 3] == (1 if either.points.kind == "AREA" else 2)).all()
+    assert (normal[:, 3] == (SourceKind.CACHE if either.points.kind == "AREA" else SourceKind.EMISSION)).all()
     ball = (position[:, 2] > -0.9) & (position[:, 2] < 1.9)
     outward = ((position - (0, 0, 1))[ball] / 0.5 * normal[ball, :3]).sum(1)
     # A facet's own normal is a few degrees off the sphere's.
