@@ -1,0 +1,130 @@
+"""What virtual point lights draw and build again after an edit: only what the edit touches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rebound.scene.data import Material, World
+from rebound.tests.support.render_scenes import Studio, box, light, ortho, place, quad, scene
+from rebound.tests.support.vpl_scenes import VPL, emitter, gathered, room, still
+
+LAMPS = [light("SPOT", (x, -0.8, 2), (x, 0, 0), key=f"lamp {x}") for x in (0, 5, 10)]
+MESHES = [quad("floor", (5, 0, 0), (7, 0, 0), (0, 6, 0)), box("block", (-0.2, -0.2, 0), (0.2, 0.2, 0.4)),
+          quad("panel", (0, 1.4, 1), (0.2, 0, 0), (0, 0, 0.2))]  # fmt: skip
+VIEW = ortho(8, 8, 2, (5, 0, 10), (5, 0, 0))
+
+
+def picture(lamps=LAMPS, block_at=5.0, block=(0.1, 0.2, 0.3), radiance=0.0, sky=0.0):
+    """A floor, three lamps over it, a block under one of them, a panel that may shine."""
+    materials = [Material("floor"), Material("block", block), emitter(radiance)]
+    matrices = {"block": place((block_at, 0, 0))}
+    return scene(MESHES, lamps, materials=materials, matrices=matrices, world=World((sky,) * 3))
+
+
+@pytest.fixture
+def studio(headless_device):
+    studio = Studio(headless_device)
+    yield studio
+    studio.free()
+
+
+def work(studio, shown, view=VIEW, **settings):
+    """(tiles drawn, voxels built, revisions of the atlas) by a sample of this scene."""
+
+    def counts():
+        technique = studio.renderer._techniques.get("vpl")
+        if technique is None:
+            return np.zeros(3, int)
+        return np.array([technique.sources.drawn, technique.voxels.built, technique.sources.revision])
+
+    before = counts()
+    gathered(studio, shown, view, 1, **settings)
+    drawn, built, revisions = counts() - before
+    return drawn, built, revisions > 0
+
+
+def test_orbit_and_next_sample_draw_and_build_nothing(studio):
+    lit = picture(radiance=1.0, sky=0.5)
+    drawn, built, _ = work(studio, lit, vpl_bounces="MANY")
+    assert (drawn, built) == (len(LAMPS) + 3, 1)  # emitters, sky and cache
+    for angle in (0.0, 0.5, 1.0):
+        turned = ortho(8, 8, 10, (5 + 10 * np.sin(angle), 0, 10 * np.cos(angle)), (5, 0, 0))
+        assert work(studio, lit, turned, vpl_bounces="MANY") == (0, 0, False)
+        assert work(studio, lit, turned, vpl_bounces="MANY", seed=3) == (0, 0, False)
+
+
+def test_moved_light_draws_its_map_and_builds_no_voxels(studio):
+    work(studio, picture())
+    matrix = LAMPS[1].world_from_light.copy()
+    matrix[0, 3] += 0.1
+    moved = [LAMPS[0], replace(LAMPS[1], world_from_light=matrix), LAMPS[2]]
+    assert work(studio, picture(moved)) == (1, 0, True)
+    dimmed = [replace(moved[0], power=(1.0, 1.0, 1.0)), *moved[1:]]
+    assert work(studio, picture(dimmed)) == (1, 0, True)
+    assert work(studio, picture(dimmed[:2]))[:2] == (0, 0)
+
+
+def test_recoloured_object_draws_maps_that_see_it_and_builds_no_voxels(studio):
+    work(studio, picture())
+    assert work(studio, picture(block=(0.9, 0.2, 0.3))) == (1, 0, True)
+
+
+def test_moved_object_builds_voxels_once(studio):
+    work(studio, picture())
+    assert work(studio, picture(block_at=5.2)) == (1, 1, True)
+    assert work(studio, picture(block_at=5.2)) == (0, 0, False)
+    assert work(studio, picture(block_at=10))[:2] == (2, 1)  # where it was, where it is
+
+
+def test_sky_and_emitters_come_and_go_without_voxels(studio):
+    work(studio, picture(sky=0.5, radiance=1.0))
+    assert work(studio, picture(sky=0.7, radiance=1.0))[1] == 0
+    assert work(studio, picture(sky=0.7, radiance=2.0))[1] == 0
+    assert work(studio, picture())[1] == 0
+    found, _ = gathered(studio, picture(lamps=[]), VIEW, 1, "diffuse_direct")
+    assert not found.any()
+
+
+def test_edited_scene_equals_one_shown_anew(studio, headless_device):
+    """One bounce keeps nothing of what was; the maps' places in the atlas do not matter but to the noise."""
+    last = picture(LAMPS[1:], 9.5, (1.0, 0.0, 0.0), sky=0.2)
+    for shown in (picture(), picture(LAMPS[:2], 2.0), picture(sky=0.5, radiance=3.0), last):
+        work(studio, shown)
+    view, names = ortho(48, 8, 2, (5, 0, 10), (5, 0, 0)), ("diffuse_indirect", "diffuse_direct")
+    kept = studio.render(last, view, 16, names, **VPL)
+    fresh = Studio(headless_device)
+    anew = fresh.render(last, view, 16, names, **VPL)
+    fresh.free()
+    for name in names:
+        assert anew[name].mean() > 0
+        assert kept[name].mean() == pytest.approx(anew[name].mean(), rel=0.02)
+
+
+def test_cache_follows_a_light_that_went_out(studio):
+    lit = picture()
+    gathered(studio, lit, VIEW, 4, vpl_bounces="MANY")
+    one, _ = gathered(studio, picture(LAMPS[:1]), VIEW, 8, vpl_bounces="MANY")
+    fresh = Studio(studio.device)
+    anew, _ = gathered(fresh, picture(LAMPS[:1]), VIEW, 8, vpl_bounces="MANY")
+    fresh.free()
+    # What went out is forgotten, but for what the first few samples still had in them.
+    assert one.mean() == pytest.approx(anew.mean(), rel=0.05)
+    dark, _ = gathered(studio, picture([]), VIEW, 1, vpl_bounces="MANY")
+    assert not dark.any()
+
+
+def test_cache_forgets_when_its_points_are_others(studio):
+    """A wall comes into a lit room, with few updates of the cache a sample."""
+    lamp = light("POINT", (-0.5, 0.2, 0.1))
+    wall = box("wall", (-0.05, -1, -1), (0.05, 1, 1))
+    view = ortho(8, 8, 0.5, (0.5, 0, 0.9), (0.5, 0, -1))
+    gathered(studio, still([room()], [lamp], 0.7), view, 4, vpl_bounces="MANY")
+    dark, _ = gathered(studio, still([room(), wall], [lamp], 0.7), view, 8, vpl_bounces="MANY", vpl_cache_rows=4)
+    assert dark.mean() < 1e-3
+
+
+def test_resolution_of_voxels_and_maps_may_change_between_samples(studio):
+    for changed in ({"vpl_voxels": 64}, {"vpl_resolution": 96}, {"vpl_pool": 70}, {"vpl_scale": "HALF"}, {}):
+        found, _ = gathered(studio, picture(radiance=1.0), VIEW, 2, **{**VPL, "vpl_bounces": "MANY", **changed})
+        assert np.isfinite(found).all() and found.any()
