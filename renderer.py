@@ -60,6 +60,7 @@ class Frame:
     resolved_target: Target
     samples: int = 0
     follows: bool = False  # whether it was restarted, not begun
+    provisional: bool = False  # whether the next sample begins anew
     is_glossy: bool = False  # whether there may be something in the glossy targets
 
     @property
@@ -128,13 +129,15 @@ class Renderer:
     def restart(self, frame: Frame) -> None:
         """Empty a frame for another picture of its size: much quicker than to begin one."""
         frame.samples = 0  # the next sample covers the sums
-        frame.follows = True
+        frame.follows, frame.provisional = True, False
 
     def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
         """Add one anti-aliased sample to ``frame``; yields progress 0..1 after every bounded piece of GPU work.
 
         Stop iterating to cancel: the frame then still is the mean of its whole samples.
         """
+        if frame.provisional:
+            self.restart(frame)
         inputs = _inputs(frame, gpu_scene, view, int(settings["seed"]))
         self._triangles = gpu_scene.triangle_count
         self._draw_gbuffer(frame, inputs)
@@ -146,6 +149,7 @@ class Renderer:
             self.device.clear(frame.indirect_target if frame.is_glossy else frame.light.diffuse_indirect)
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
+        frame.provisional = technique is not None and technique.provisional
         self._accumulate(frame, inputs, indirect=technique is not None)
         if technique is not None and any(view.key == settings["show"] for view in technique.views):
             self._show(frame, inputs, technique, settings)

@@ -60,6 +60,11 @@ class Technique(Protocol):
 
     def __init__(self, device: Device) -> None: ...
 
+    @property
+    def provisional(self) -> bool:
+        """Whether the newest sample was made in haste and is not to be summed with those that follow."""
+        ...
+
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """Add this sample's indirect light to ``targets``.
 

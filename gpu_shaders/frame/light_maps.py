@@ -28,12 +28,16 @@ DEPTH_FORMAT = "DEPTH32F"
 
 @dataclass(frozen=True, eq=False)
 class MapTile:
-    """One face in its place. ``look`` is whatever else of the light the picture depends on."""
+    """One face in its place. ``look`` is whatever else of the light the picture depends on.
+
+    ``part`` of its tile's width is drawn, a power of 1/2.
+    """
 
     owner: Hashable  # Light.key
     light: int  # index into the light table
     face: Face
     look: bytes = b""
+    part: float = 1.0
 
     @property
     def key(self) -> Hashable:
@@ -41,7 +45,7 @@ class MapTile:
 
     @property
     def fingerprint(self) -> bytes:
-        return self.face.clip_from_world.tobytes() + np.array([self.face.far]).tobytes() + self.look
+        return self.face.clip_from_world.tobytes() + np.array([self.face.far, self.part]).tobytes() + self.look
 
 
 class LightMaps:
@@ -86,7 +90,7 @@ class LightMaps:
     def face_row(self, tile: MapTile) -> dict:
         """The MAP_FACE row of a tile that has its place."""
         assert self.atlas is not None
-        return face_row(tile.face, self.atlas, self._slots[tile.key])
+        return {**face_row(tile.face, self.atlas, self._slots[tile.key]), "tile": self.viewport(tile)[2]}
 
     def stale(self, gpu_scene: GpuScene) -> list[MapTile]:
         """The tiles that must be drawn again for this scene. The others are now known to be good for it."""
@@ -105,18 +109,23 @@ class LightMaps:
         return moved is None or bool(tile.face.sees(moved).any())
 
     def viewport(self, tile: MapTile) -> tuple[int, int, int, int]:
-        """The tile's rectangle in the atlas: x, y, width, height in texels."""
+        """The rectangle in the atlas that the tile is drawn in: x, y, width, height in texels."""
         assert self.atlas is not None
-        return self.atlas.viewport(self._slots[tile.key])
+        x, y, width, height = self.atlas.viewport(self._slots[tile.key])
+        return x, y, max(int(width * tile.part), 1), max(int(height * tile.part), 1)
 
     def begin(self, tile: MapTile, gpu_scene: GpuScene) -> tuple[Target, tuple[int, int, int, int]]:
         """Clear a tile for drawing and count it as up to date; returns where to draw."""
-        assert self.target is not None
-        viewport = self.viewport(tile)
-        self.device.clear(self.target, color=(0.0, 0.0, 0.0, 0.0), depth=1.0, viewport=viewport)
+        assert self.target is not None and self.atlas is not None
+        whole = self.atlas.viewport(self._slots[tile.key])
+        self.device.clear(self.target, color=(0.0, 0.0, 0.0, 0.0), depth=1.0, viewport=whole)
         self._drawn[tile.key] = tile.fingerprint, gpu_scene.revision
         self.drawn += 1
-        return self.target, viewport
+        return self.target, self.viewport(tile)
+
+    def longest_ago_first(self, tiles: Sequence[MapTile]) -> list[MapTile]:
+        """The tiles in the order of when they were last good, those that never were first."""
+        return sorted(tiles, key=lambda tile: self._drawn.get(tile.key, (b"", -1))[1])
 
     def _allocate(self, atlas: Atlas) -> None:
         self._free_textures()

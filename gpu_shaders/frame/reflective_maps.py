@@ -37,21 +37,27 @@ class ReflectiveShadowMaps(LightMaps):
     def __init__(self, device: Device) -> None:
         super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F", "RGBA32F"])
         self.light_table: Texture | None = None
+        self.pending = 0  # tiles that are known to be out of date
         self._laid_out: tuple[int, int] | None = None
 
-    def update(self, gpu_scene: GpuScene, resolution: int) -> Iterator[float]:
-        """Draw the tiles that are out of date; yields progress 0..1 after each."""
+    def update(self, gpu_scene: GpuScene, resolution: int, most: int = 0) -> Iterator[float]:
+        """Draw the tiles that are out of date; yields progress 0..1 after each.
+
+        ``most`` of them at once, 0 for all; ``pending`` tells how many are left for the next calls.
+        """
         if self._laid_out == (gpu_scene.revision, resolution):
             return
         self._lay_out_lights(gpu_scene, resolution)
-        stale = self.stale(gpu_scene)
-        for done, tile in enumerate(stale):
+        stale = self.longest_ago_first(self.stale(gpu_scene))
+        drawn = stale[:most] if most else stale
+        for done, tile in enumerate(drawn):
             if tile.light >= 0:
                 self._draw(gpu_scene, tile)
             else:
                 self._draw_other(gpu_scene, tile)
-            yield (done + 1) / len(stale)
-        self._laid_out = (gpu_scene.revision, resolution)
+            yield (done + 1) / len(drawn)
+        self.pending = len(stale) - len(drawn)
+        self._laid_out = None if self.pending else (gpu_scene.revision, resolution)
 
     def read(self) -> Iterator[tuple[int, str, dict[str, np.ndarray]]]:
         """Every tile read back: index of its light, name of its face, and the layers of ``renderer.RsmBuffers``."""
@@ -77,14 +83,19 @@ class ReflectiveShadowMaps(LightMaps):
     def _lay_out_lights(self, gpu_scene: GpuScene, resolution: int) -> None:
         tiles: list[MapTile] = []
         rows = []
+        parts = self._parts(gpu_scene)
         for index, light in enumerate(gpu_scene.scene.lights):
             faces = light_faces(light, gpu_scene.boxes)
             row = light_row(light, None, len(tiles), len(faces))
             look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
             rows.append(row)
-            tiles += [MapTile(light.key, index, face, look) for face in faces]
+            tiles += [MapTile(light.key, index, face, look, parts[index]) for face in faces]
         self.lay_out((*tiles, *self._other_tiles(gpu_scene)), resolution)
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _parts(self, gpu_scene: GpuScene) -> Sequence[float]:
+        """What part of its tiles' width each light is drawn in."""
+        return [1.0] * len(gpu_scene.scene.lights)
 
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
         """Tiles behind the lights' that are no picture from a light; their ``light`` is -1."""

@@ -129,6 +129,7 @@ class Rsm:
     settings = SETTINGS
     shaders = SHADERS
     views = ()
+    provisional = False
 
     def __init__(self, device: Device) -> None:
         self.device = device

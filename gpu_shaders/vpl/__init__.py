@@ -73,6 +73,7 @@ class Vpl:
         self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
         self._sorted = -1  # revision of the sources that the indices were made for
         self.gathering = Gathering(device)
+        self._settings: Mapping[str, Value] = {}  # of the last sample
         self._picture = 0  # number of the sample in its sequence of noise
         self._cache_updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
         self._cache_revision = -1  # of the scene that the cache last gathered in
@@ -80,13 +81,13 @@ class Vpl:
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """See ``Technique.indirect``."""
         gpu_scene = inputs.gpu_scene
-        if inputs.sample == 0 and not (inputs.follows and settings["reuse"]):
+        if inputs.sample == 0 and not (inputs.follows and settings["reuse"] and settings == self._settings):
             self._forget()
+        self._settings = settings
         # Noise goes on from picture to picture where they are averaged, else every picture has the same.
         self._picture = self._picture + 1 if settings["reuse"] else inputs.sample
-        for done in self.sources.update_all(
-            gpu_scene, int(settings["resolution"]), with_cache=self._wants_cache(inputs, settings)
-        ):
+        with_cache, most = self._wants_cache(inputs, settings), int(settings["maps_at_once"]) if inputs.follows else 0
+        for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache, most):
             yield MAPS_DONE * done
         if not self.sources.tiles:
             return
@@ -98,6 +99,11 @@ class Vpl:
         about = PoolState(self._picture, self.sources.revision)
         for done in self.gathering.draw(inputs, settings, candidates, about, targets):
             yield CACHE_DONE + (1.0 - CACHE_DONE) * done
+
+    @property
+    def provisional(self) -> bool:
+        """See ``Technique.provisional``."""
+        return self.sources.pending > 0
 
     def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
         """See ``Technique.view``."""
@@ -177,6 +183,7 @@ class Vpl:
         return {
             "rsm_maps": self.sources.light_tiles,
             "rsm_maps_drawn": self.sources.drawn,
+            "rsm_maps_pending": self.sources.pending,
             "rsm_resolution": atlas.tile if atlas else 0,
             "vpls": len(self.sources.tiles) * atlas.tile**2 if atlas else 0,
         }

@@ -31,6 +31,18 @@ SETTINGS = (
         unit="texels",
     ),
     Setting(
+        "maps_at_once",
+        "INT",
+        "Maps at Once",
+        "Lights' maps drawn anew for one picture of a moving view, those that wait longest first; 0 for all. Fewer "
+        "keeps a scene of many lights fluent while objects move, at the cost of light that follows some pictures later",
+        0,
+        viewport_default=16,
+        minimum=0,
+        maximum=4096,
+        unit="maps",
+    ),
+    Setting(
         "pool",
         "INT",
         "Virtual Lights",

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...device.interface import Device, Texture
+from ...scene.data import LightKind
 from ..frame.light_maps import MapTile
 from ..frame.maps import Face
 from ..frame.reflective_maps import ReflectiveShadowMaps
@@ -31,6 +32,8 @@ TILE_STEP = 16
 SKY_DISTANCE = 1e3
 # Points along a side of the square that emitters, and the cache, have in their tile.
 POINTS_SIDE = 64
+# Part of its tiles' width that a light gets whose power is at least such a share of the strongest one's.
+PARTS = ((1.0, 1 / 16), (0.5, 1 / 256), (0.25, 0.0))
 EMITTERS, CACHE, SKY_PATCHES = "emitters", "cache", "sky"  # owners of the tiles that are no light's
 
 # The face of a tile that is no picture: it "sees" every box, so that whatever moves makes it be drawn again.
@@ -48,12 +51,15 @@ class Sources(ReflectiveShadowMaps):
         self._cache = SurfacePoints(device, "AREA")
         self._with_cache = False
 
-    def update_all(self, gpu_scene: GpuScene, resolution: int, with_cache: bool) -> Iterator[float]:
-        """Draw what is out of date; yields progress 0..1. ``with_cache``: whether surfaces reflect light once more."""
+    def update_all(self, gpu_scene: GpuScene, resolution: int, with_cache: bool, most: int) -> Iterator[float]:
+        """Draw what is out of date, at most ``most`` tiles of it, 0 for all; yields progress 0..1.
+
+        ``with_cache``: whether surfaces reflect light once more.
+        """
         if with_cache != self._with_cache:
             self._with_cache, self._laid_out = with_cache, None
         drawn = self.drawn
-        yield from self.update(gpu_scene, -(-resolution // TILE_STEP) * TILE_STEP)
+        yield from self.update(gpu_scene, -(-resolution // TILE_STEP) * TILE_STEP, most)
         self.revision += self.drawn != drawn
 
     def tile_of(self, owner: str) -> MapTile | None:
@@ -94,6 +100,15 @@ class Sources(ReflectiveShadowMaps):
             origin = self.viewport(tile)[:2]
             rows.append({"origin": origin, "light": tile.light, "first": first, "owned": counts[tile.owner]})
         self.tile_table = replace_table(self.device, TILE.pack(rows), self.tile_table)
+
+    def _parts(self, gpu_scene: GpuScene) -> Sequence[float]:
+        """Lights that are much weaker than the strongest send few virtual lights: coarser maps do for them."""
+        low, high = gpu_scene.boxes[:, 0].min(0), gpu_scene.boxes[:, 1].max(0)
+        across = float(np.linalg.norm(high - low)) ** 2  # m² that a sun shines on, about
+        lights = gpu_scene.scene.lights
+        power = [np.mean(light.power) * (across if light.kind is LightKind.SUN else 1.0) for light in lights]
+        strongest = max([*power, 1e-30])
+        return [next((part for part, share in PARTS if p >= share * strongest), PARTS[-1][0]) for p in power]
 
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
         scene = gpu_scene.scene

@@ -66,7 +66,7 @@ Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
   vec4 place = texelFetch(position_area_tx, texel, 0);
   vec4 normal_kind = texelFetch(normal_kind_tx, texel, 0);
   vec3 apart = place.xyz - hit;
-  float near = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_TEXELS * sqrt(place.w);
+  float near = CANDIDATES_VOXELS * voxel_edge_at(hit) + CANDIDATES_TEXELS * sqrt(place.w);
   if (normal_kind.w == 0.0 || dot(apart, apart) > near * near || dot(normal_kind.xyz, direction) >= 0.0) {
     return VPL_NONE;
   }
@@ -89,7 +89,7 @@ vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
 {
   for (int attempt = 0; attempt < 2 && vpl_frame.cache.z > 0.0; attempt++) {
     vec3 place = index_place(vpl_frame.index, hit) + (attempt == 0 ? noise - 0.5 : vec3(0.0));
-    float nearest = CANDIDATES_VOXELS * voxel_grid.edge + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
+    float nearest = CANDIDATES_VOXELS * voxel_edge_at(hit) + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
     ivec2 found = ivec2(-1);
     for (int axis = 0; axis < 3; axis++) {
       int point = index_point(cache_index_tx, place, index_side(axis, -direction[axis]));
@@ -128,7 +128,7 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction)
     ivec2 texel = index_atlas_texel(vpl_frame.emitters, point);
     vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
     vec3 apart = hit - texelFetch(position_area_tx, texel, 0).xyz;
-    if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_grid.edge &&
+    if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_edge_at(hit) &&
         length(apart) * vpl_frame.index.w < CANDIDATES_CELLS) {
       return texel;
     }
