@@ -1,5 +1,5 @@
-/* Rays through the grid of occupied voxels: the sampler voxel_tx and the uniform block voxel_grid, which a shader
- * declares by VOXEL_SAMPLERS and VOXEL_GRID (frame/voxel_shaders.py). Outside the grid nothing blocks. */
+/* Rays through the grids of occupied voxels: the sampler voxel_tx and the uniform block voxel_grid, which a shader
+ * declares by VOXEL_SAMPLERS and VOXEL_GRID (frame/voxel_shaders.py). Outside all grids nothing blocks. */
 #include "frame/voxel_cell_lib.glsl"
 
 /* More than any ray needs, so that an endless loop is none. */
@@ -11,6 +11,10 @@ const float VOXEL_NEAREST = 2.0;
 /* Out of another surface's voxels towards who sees the point: so many steps of so many voxels. */
 const int VOXEL_ESCAPES = 4;
 const float VOXEL_ESCAPE = 0.75;
+/* Of an outer grid's voxel: off a plane that ends with its layer, FLUSH of frame/voxel_grids.py below that. */
+const float VOXEL_FLUSH_START = 0.04;
+/* Cosine: a plane along an axis has one layer of voxels however wide it is. */
+const float VOXEL_ALONG_AXIS = 0.99999;
 
 /* Bits of a texel that a ray may still meet from a cell on, itself included; forward is 1 or 0 along each axis. */
 uint voxel_ahead(ivec3 cell, ivec3 forward)
@@ -33,33 +37,33 @@ ivec3 voxel_widening(uint texel, ivec3 cell, ivec3 forward)
   return ivec3(int(pairs_empty));
 }
 
-/* Where a ray along a unit direction first enters an occupied voxel: metres, 0 if it starts in one, negative if it
- * meets none before `reach`. */
-float voxel_trace(vec3 origin, vec3 direction, float reach)
+/* Where a ray first enters an occupied voxel of one grid between `way` and `reach`: metres along it from its origin, or
+ * negative. If it starts in the grid, `way` is then how far the ray is known. */
+float voxel_trace_grid(VoxelPlace place, vec3 origin, vec3 slope, vec3 inverse, float reach, inout float way)
 {
-  vec3 start = (origin - voxel_grid.origin) / voxel_grid.edge;
-  /* No component is 0: its inverse times a distance of 0 would be nothing at all. */
-  vec3 slope = mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
-  vec3 inverse = 1.0 / slope;
+  vec3 start = (origin - place.origin) / place.edge;
   vec3 one = (vec3(0.0) - start) * inverse;
-  vec3 other = (voxel_grid.size - start) * inverse;
+  vec3 other = (place.size - start) * inverse;
   vec3 enter = min(one, other);
   vec3 leave = max(one, other);
-  float t = max(max(enter.x, enter.y), max(enter.z, 0.0));
-  float last = min(min(leave.x, leave.y), min(leave.z, reach / voxel_grid.edge));
+  float first = max(enter.x, max(enter.y, enter.z));
+  float t = max(first, way / place.edge);
+  float last = min(min(leave.x, leave.y), min(leave.z, reach / place.edge));
   if (!(t < last)) {
     return -1.0;
   }
+  float met = -1.0;
   ivec3 forward = ivec3(greaterThan(slope, vec3(0.0)));
-  ivec3 highest = ivec3(voxel_grid.size) - 1;
+  ivec3 highest = ivec3(place.size) - 1;
   ivec3 voxel = clamp(ivec3(floor(start + t * slope)), ivec3(0), highest);
   int level = 0;
   for (int rounds = 0; rounds < VOXEL_MOST_STEPS; rounds++) {
     ivec3 cell = voxel >> (2 * level);
-    uint texel = texelFetch(voxel_tx, voxel_texel(cell, level), 0).x;
+    uint texel = texelFetch(voxel_tx, voxel_texel(place, cell, level), 0).x;
     if ((texel >> voxel_bit(cell) & 1u) != 0u) {
       if (level == 0) {
-        return t * voxel_grid.edge;
+        met = t * place.edge;
+        break;
       }
       level--;
       continue;
@@ -72,7 +76,7 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
     vec3 ends = (vec3(low + (forward << shift)) - start) * inverse;
     t = min(ends.x, min(ends.y, ends.z));
     if (t >= last) { /* the grid's own end as well: it is computed alike */
-      return -1.0;
+      break;
     }
     ivec3 inside = clamp(ivec3(floor(start + t * slope)), low, high);
     bool by_x = ends.x == t;
@@ -84,7 +88,33 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
     bool left_parent = voxel >> (2 * level + 2) != low >> (2 * level + 2);
     level += int(left_parent && level < VOXEL_LEVELS - 1);
   }
-  return -1.0;
+  way = first > 0.0 ? way : met >= 0.0 ? met : last * place.edge;
+  return met;
+}
+
+/* Whether P lies in the grid around the scene, where voxels are finest. */
+bool voxel_inside(vec3 P)
+{
+  return voxel_place_holds(voxel_place(0), P);
+}
+
+/* Where a ray along a unit direction first enters an occupied voxel: metres, 0 if it starts in one, negative if it
+ * meets none before `reach`. An outer grid has nothing inside the one before it: where a ray has left a grid it goes on
+ * in the next, and what it meets of several grids that it starts outside of is the nearest. */
+float voxel_trace(vec3 origin, vec3 direction, float reach)
+{
+  /* No component is 0: its inverse times a distance of 0 would be nothing at all. */
+  vec3 slope = mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
+  vec3 inverse = 1.0 / slope;
+  float way = 0.0;
+  float met = voxel_trace_grid(voxel_place(0), origin, slope, inverse, reach, way);
+  reach = met >= 0.0 ? met : reach;
+  for (int grid = 1; grid <= voxel_grid.outer_count && way < reach; grid++) {
+    float found = voxel_trace_grid(voxel_place(grid), origin, slope, inverse, reach, way);
+    met = found >= 0.0 ? found : met;
+    reach = found >= 0.0 ? found : reach;
+  }
+  return met;
 }
 
 /* Whether nothing lies on the way from one point to another. */
@@ -94,29 +124,55 @@ bool voxel_clear(vec3 start, vec3 end)
   return reach <= 0.0 || voxel_trace(start, (end - start) / reach, reach) < 0.0;
 }
 
-/* Whether something is in the voxel that a point lies in; false outside the grid. */
-bool voxel_occupied(vec3 P)
+/* The finest grid that holds P, or the widest. */
+VoxelPlace voxel_place_at(vec3 P)
 {
-  ivec3 voxel = ivec3(floor((P - voxel_grid.origin) / voxel_grid.edge));
-  if (any(lessThan(voxel, ivec3(0))) || any(greaterThanEqual(voxel, ivec3(voxel_grid.size)))) {
-    return false;
+  int grid = 0;
+  while (grid < voxel_grid.outer_count && !voxel_place_holds(voxel_place(grid), P)) {
+    grid++;
   }
-  return (texelFetch(voxel_tx, voxel_texel(voxel, 0), 0).x >> voxel_bit(voxel) & 1u) != 0u;
+  return voxel_place(grid);
 }
 
-/* Metres along its normal to where a plane's own voxels end. An occupied voxel's centre is no more than half an edge
+/* Metres of one voxel where P lies. */
+float voxel_edge_at(vec3 P)
+{
+  return voxel_place_at(P).edge;
+}
+
+/* Whether something is in the voxel that a point lies in; false outside all grids. */
+bool voxel_occupied(vec3 P)
+{
+  VoxelPlace place = voxel_place_at(P);
+  ivec3 voxel = ivec3(floor((P - place.origin) / place.edge));
+  if (any(lessThan(voxel, ivec3(0))) || any(greaterThanEqual(voxel, ivec3(place.size)))) {
+    return false;
+  }
+  return (texelFetch(voxel_tx, voxel_texel(place, voxel, 0), 0).x >> voxel_bit(voxel) & 1u) != 0u;
+}
+
+/* Voxels along its normal to where a plane's own ones end. An occupied voxel's centre is no more than half an edge
  * from the plane along some axis, and its corners reach half a diagonal's share further. */
 float voxel_clearance(vec3 unit_normal)
 {
   vec3 n = abs(unit_normal);
-  return (0.5 * (max(n.x, max(n.y, n.z)) + n.x + n.y + n.z) + VOXEL_ROUNDING) * voxel_grid.edge;
+  return 0.5 * (max(n.x, max(n.y, n.z)) + n.x + n.y + n.z) + VOXEL_ROUNDING;
 }
 
 /* Where a ray from a surface may start without meeting the surface's own voxels, on the side that its unit normal
- * points to: 1.0 (along an axis) to 1.2 edges off it. Beside a corner that is in the other surface's voxels. */
+ * points to: 1.0 (along an axis) to 1.2 edges off it. Beside a corner that is in the other surface's voxels. Outside
+ * the finest grid a plane along an axis is left as closely as in it where the layer of its voxels ends with it. */
 vec3 voxel_start(vec3 P, vec3 geometric_normal)
 {
-  return P + voxel_clearance(geometric_normal) * geometric_normal;
+  float clearance = voxel_clearance(geometric_normal);
+  float edge = voxel_edge_at(P);
+  vec3 start = P + clearance * edge * geometric_normal;
+  vec3 n = abs(geometric_normal);
+  if (edge > voxel_grid.edge && max(n.x, max(n.y, n.z)) > VOXEL_ALONG_AXIS) {
+    vec3 close = P + max(clearance * voxel_grid.edge, VOXEL_FLUSH_START * edge) * geometric_normal;
+    return voxel_occupied(close) ? start : close;
+  }
+  return start;
 }
 
 /* The same for a point known to be seen from the unit direction `seen_from` (the camera's; the light's, for a point of
@@ -124,8 +180,9 @@ vec3 voxel_start(vec3 P, vec3 geometric_normal)
 vec3 voxel_start_seen(vec3 P, vec3 geometric_normal, vec3 seen_from)
 {
   vec3 start = voxel_start(P, geometric_normal);
+  float edge = voxel_edge_at(P);
   for (int steps = 0; steps <= VOXEL_ESCAPES; steps++) {
-    vec3 moved = start + float(steps) * VOXEL_ESCAPE * voxel_grid.edge * seen_from;
+    vec3 moved = start + float(steps) * VOXEL_ESCAPE * edge * seen_from;
     if (!voxel_occupied(moved)) {
       return moved;
     }
@@ -137,6 +194,6 @@ vec3 voxel_start_seen(vec3 P, vec3 geometric_normal, vec3 seen_from)
  * nearer than the grid can tell see each other. */
 bool voxel_visible(vec3 P, vec3 P_geometric, vec3 Q, vec3 Q_geometric)
 {
-  return distance(P, Q) < VOXEL_NEAREST * voxel_grid.edge ||
+  return distance(P, Q) < VOXEL_NEAREST * voxel_edge_at(P) ||
          voxel_clear(voxel_start(P, P_geometric), voxel_start(Q, Q_geometric));
 }

@@ -4,9 +4,11 @@ from ...device.shader import Image, Shader
 from ...device.structs import Struct
 from .structs import INSTANCE
 
+MOST_OUTER_GRIDS = 5
+
 # A voxel is one bit. 4 x 4 x 4 of them make a brick: two texels side by side, the lower and the upper two layers. A
 # cell of the next level is a brick of this one, and 4 x 4 x 4 cells make a brick again. All levels lie in one volume,
-# each above the one before (voxel_cell_lib.glsl).
+# each above the one before, and so do all grids (voxel_cell_lib.glsl).
 VOXEL_GRID = Struct(
     "VoxelGrid",
     origin="vec3",  # lower corner, world
@@ -14,6 +16,9 @@ VOXEL_GRID = Struct(
     size="vec3",  # voxels along each axis
     slice_1="int",  # the first slice of the volume that holds level 1, and level 2
     slice_2="int",
+    outer_count="int",  # ever wider grids around this one: place_1 and size_1 are the next, and so on
+    **{f"place_{number}": "vec4" for number in range(1, MOST_OUTER_GRIDS + 1)},  # lower corner, metres of one voxel
+    **{f"size_{number}": "vec4" for number in range(1, MOST_OUTER_GRIDS + 1)},  # voxels, first slice of the volume
 )
 
 VOXEL_SAMPLERS = {"voxel_tx": "UINT_3D"}
@@ -29,5 +34,5 @@ VOXEL_DRAW = Shader(
     images={"voxel_img": Image("R32UI", "UINT_3D_ATOMIC")},
     uniforms={"voxel_grid": VOXEL_GRID},
     structs=(INSTANCE,),
-    constants={"pc_clip_from_world": "MAT4", "pc_first_instance": "INT", "pc_axis": "INT"},
+    constants={"pc_clip_from_world": "MAT4", "pc_first_instance": "INT", "pc_axis": "INT", "pc_grid": "INT"},
 )

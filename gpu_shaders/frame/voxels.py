@@ -8,10 +8,8 @@ Approach to Voxelization). So no ray passes a surface, and one along the axes is
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,65 +17,16 @@ import numpy as np
 from ...device.interface import Device, Target, Texture
 from ...scene.data import Visibility
 from .draws import ADD, draw_scene, visible_draws
-from .maps import MOST_HUGE_OBJECTS, WORTHWHILE_SHRINK
+from .voxel_grids import VoxelGrid, grid_bounds, nested_grids, pack_grids, volume_size
 from .voxel_shaders import VOXEL_DRAW, VOXEL_GRID, VOXEL_SAMPLERS
 
 if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
 
-__all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels"]
+__all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels", "grid_bounds"]
 
 # Bounded pieces of work: a millisecond of a GPU, a tenth of a second in software.
 PIECE_TRIANGLES = 300_000
-# One more huge object is left out where that makes the box so many times smaller again.
-FURTHER_SHRINK = 2.0
-# Voxels around the scene's box: its faces, often walls, lie well inside a voxel, and their rims cover its centre.
-MARGIN = 0.49
-SMALLEST_EDGE = 1e-6  # metres: of a scene that is a point
-
-
-class VoxelGrid:
-    """Where the voxels lie: cubes of ``edge`` metres, ``size`` of them along each axis from ``origin``."""
-
-    def __init__(self, bounds: np.ndarray, resolution: int) -> None:
-        extent = bounds[1] - bounds[0]
-        self.edge = max(float(extent.max()) / (resolution - 2 * MARGIN), SMALLEST_EDGE)
-        self.origin = bounds[0] - MARGIN * self.edge
-        self.size = np.minimum(np.ceil(extent / self.edge + 2 * MARGIN - 1e-6).astype(int), resolution)
-        self.bricks = [-(-self.size // 4**level) for level in (1, 2, 3)]  # by level, (3,) each
-
-    @property
-    def volume_size(self) -> tuple[int, int, int]:
-        """Texels of the volume with all levels, one above the other."""
-        x, y, _ = self.bricks[0]
-        return 2 * int(x), int(y), int(sum(bricks[2] for bricks in self.bricks))
-
-    @cached_property
-    def block(self) -> np.ndarray:
-        """The uniform block VOXEL_GRID."""
-        first = int(self.bricks[0][2])
-        row = {
-            "origin": self.origin,
-            "edge": self.edge,
-            "size": self.size,
-            "slice_1": first,
-            "slice_2": first + int(self.bricks[1][2]),
-        }
-        return VOXEL_GRID.pack([row], for_uniform=True)
-
-    def clip_from_world(self, axis: int) -> np.ndarray:
-        """(4, 4) looking along an axis, the next axis to the right and the one after it up; depth 0 at the origin."""
-        clip = np.zeros((4, 4))
-        for row in range(3):
-            k = (axis + 1 + row) % 3
-            clip[row, k] = 2.0 / (self.size[k] * self.edge)
-            clip[row, 3] = -1.0 - clip[row, k] * self.origin[k]
-        clip[3, 3] = 1.0
-        return clip
-
-    def viewport(self, axis: int) -> tuple[int, int, int, int]:
-        """A pixel a voxel, seen along an axis."""
-        return 0, 0, int(self.size[(axis + 1) % 3]), int(self.size[(axis + 2) % 3])
 
 
 class Voxels:
@@ -86,7 +35,9 @@ class Voxels:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.built = 0
-        self.grid: VoxelGrid | None = None
+        self.grid: VoxelGrid | None = None  # around the scene but its huge objects
+        self.grids: tuple[VoxelGrid, ...] = ()  # the same, and what is around it
+        self._block = np.zeros(0)  # the uniform block VOXEL_GRID
         self._volume: Texture | None = None
         self._canvas: Target | None = None
         self._holds: tuple[int, int] | None = None  # resolution, revision of the scene
@@ -106,10 +57,14 @@ class Voxels:
             self._holds = resolution, gpu_scene.revision
             return
         self._holds = None
-        self._allocate(VoxelGrid(grid_bounds(gpu_scene.boxes), resolution))
-        pieces = [(axis, piece) for piece in _pieces(visible_draws(gpu_scene, Visibility.SHADOW)) for axis in range(3)]
-        for number, (axis, draws) in enumerate(pieces, 1):
-            self._draw(gpu_scene, axis, draws)
+        self._allocate(nested_grids(gpu_scene.boxes, resolution))
+        pieces = []
+        for index in range(len(self.grids)):
+            seen = self.grids[0].reached_from_outside if index else None
+            draws = visible_draws(gpu_scene, Visibility.SHADOW, seen)
+            pieces += [(index, axis, piece) for piece in _pieces(draws) for axis in range(3)]
+        for number, (index, axis, draws) in enumerate(pieces, 1):
+            self._draw(gpu_scene, index, axis, draws)
             yield number / len(pieces)
         self.built += 1
         self._holds = resolution, gpu_scene.revision
@@ -117,12 +72,13 @@ class Voxels:
     def bindings(self) -> dict[str, Any]:
         """What a shader with VOXEL_SAMPLERS and the uniform block ``voxel_grid`` is given."""
         assert self.grid is not None and self._holds is not None
-        return {"voxel_tx": self._volume, "voxel_grid": self.grid.block}
+        return {"voxel_tx": self._volume, "voxel_grid": self._block}
 
     def free(self) -> None:
         for resource in (self._canvas, *(self._canvas.colors if self._canvas else ()), self._volume):
             self.device.free(resource)
         self._canvas = self._volume = self.grid = self._holds = None
+        self.grids = ()
 
     def _is_good(self, gpu_scene: GpuScene, resolution: int) -> bool:
         if self._holds is None or self._holds[0] != resolution:
@@ -130,50 +86,33 @@ class Voxels:
         moved = gpu_scene.moved_since(self._holds[1], shapes_only=True)
         return moved is not None and not len(moved)
 
-    def _allocate(self, grid: VoxelGrid) -> None:
+    def _allocate(self, grids: tuple[VoxelGrid, ...]) -> None:
         """A volume of zeros: a new one, which every backend fills quickest."""
         self.free()
-        self.grid = grid
-        self._volume = self.device.texture(grid.volume_size, "R32UI")
-        side = int(grid.size.max())
+        self.grid, self.grids, self._block = grids[0], grids, pack_grids(grids)
+        self._volume = self.device.texture(volume_size(grids), "R32UI")
+        side = max(int(grid.size.max()) for grid in grids)
         self._canvas = self.device.target([self.device.texture((side, side), "R8")])
 
-    def _draw(self, gpu_scene: GpuScene, axis: int, draws: Sequence[Draw]) -> None:
-        assert self.grid is not None and self._canvas is not None
+    def _draw(self, gpu_scene: GpuScene, index: int, axis: int, draws: Sequence[Draw]) -> None:
+        assert self._canvas is not None
+        grid = self.grids[index]
         draw_scene(
             self.device,
             gpu_scene,
             VOXEL_DRAW,
             self._canvas,
             draws,
-            viewport=self.grid.viewport(axis),
+            viewport=grid.viewport(axis),
             # Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's
             # software renderer leaves out what was drawn there before, and what it would have marked.
             state=ADD,
             voxel_img=self._volume,
-            voxel_grid=self.grid.block,
-            pc_clip_from_world=self.grid.clip_from_world(axis),
+            voxel_grid=self._block,
+            pc_clip_from_world=grid.clip_from_world(axis),
+            pc_grid=index,
             pc_axis=axis,
         )
-
-
-def grid_bounds(boxes: np.ndarray) -> np.ndarray:
-    """(2, 3) around the boxes (n, 2, 3), without a few huge ones that would take nearly all voxels."""
-    order = np.argsort((boxes[:, 1] - boxes[:, 0]).max(1))
-    bounds, shrink = _around(boxes), math.sqrt(WORTHWHILE_SHRINK)
-    for left_out in range(1, min(MOST_HUGE_OBJECTS, len(order) - 1) + 1):
-        kept = _around(boxes[order[:-left_out]])
-        if _longest(bounds) > shrink * _longest(kept) > 0.0:
-            bounds, shrink = kept, FURTHER_SHRINK
-    return bounds
-
-
-def _around(boxes: np.ndarray) -> np.ndarray:
-    return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
-
-
-def _longest(bounds: np.ndarray) -> float:
-    return float((bounds[1] - bounds[0]).max())
 
 
 def _pieces(draws: Sequence[Draw]) -> Iterator[list[Draw]]:
