@@ -7,8 +7,8 @@ import pytest
 
 from rebound.device import Shader
 from rebound.gpu_shaders.vpl import MOST_WARM_UP
-from rebound.scene.data import World
-from rebound.tests.support.render_scenes import Studio, box, light, ortho, quad, sphere
+from rebound.scene.data import Material, World
+from rebound.tests.support.render_scenes import Studio, box, light, ortho, perspective, quad, sphere
 from rebound.tests.support.vpl_scenes import (
     BLACK,
     GREY,
@@ -16,6 +16,7 @@ from rebound.tests.support.vpl_scenes import (
     form_factor,
     gathered,
     power_on_walls,
+    room,
     seen_part,
     still,
 )
@@ -217,6 +218,22 @@ def test_light_of_a_closed_room_goes_on_and_none_is_made(studio, albedo, least):
     lamp = light("POINT", (0, 0, 0))  # all walls are alike
     found = power_on_walls(studio, lamp, albedo, 1, vpl_bounces="MANY") / (100 * albedo / (1 - albedo))
     assert least < found < 1.01
+
+
+INSIDE = {"nothing": [], "block": [box("block", (-0.4, -0.4, -1), (0.4, 0.4, -0.2))]}
+
+
+# In a closed place of one radiance everything receives the same from everywhere, whatever stands in it. What is missing
+# are rays whose hit finds no point in the index of emitters or of the cache: more of them beside edges.
+@pytest.mark.parametrize(("inside", "direct", "many"), [("nothing", 0.95, 0.92), ("block", 0.9, 0.82)])
+def test_furnace_is_of_one_brightness(studio, inside, direct, many):
+    glowing = Material("glowing", (0.5, 0.5, 0.5), emission=(1.0, 1.0, 1.0))
+    meshes = [room(), *INSIDE[inside]]
+    shown = still(meshes, materials=[glowing] * len(meshes))
+    view = perspective(16, 16, 100, (-0.9, -0.9, 0.9), (0, 0, -0.3))
+    for name, least in (("diffuse_direct", direct), ("diffuse_indirect", many)):
+        found, _ = gathered(studio, shown, view, 8, name, vpl_bounces="MANY")
+        assert least < found.mean() < 1.01, name
 
 
 def test_white_room_grows_by_a_bounce_a_round_at_most(studio):
