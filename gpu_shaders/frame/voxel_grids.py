@@ -20,8 +20,9 @@ OUTER_RESOLUTION = 128
 # How many times wider than the one inside it an outer grid is, where MOST_OUTER_GRIDS of them then hold everything.
 OUTER_STEP = 4.0
 # In voxels of an outer grid: how deep in its voxel a huge plane lies, seen from the scene. So its layer blocks as early
-# as the plane does, and rays over the plane do not graze the layer of every next grid. VOXEL_FLUSH_START is twice that.
-FLUSH = 0.02
+# as the plane does, and rays that leave a grid just over the plane are over the next one's layer. Well above rounding
+# (VOXEL_NUDGE of voxel_draw_frag.glsl), and so small that VOXEL_FLUSH_START of voxel_lib.glsl clears the next grid's.
+FLUSH = 0.01
 
 
 class VoxelGrid:

@@ -11,8 +11,9 @@ const float VOXEL_NEAREST = 2.0;
 /* Out of another surface's voxels towards who sees the point: so many steps of so many voxels. */
 const int VOXEL_ESCAPES = 4;
 const float VOXEL_ESCAPE = 0.75;
-/* Of an outer grid's voxel: off a plane that ends with its layer, FLUSH of frame/voxel_grids.py below that. */
-const float VOXEL_FLUSH_START = 0.04;
+/* Of an outer grid's voxel: off a plane that lies as far below its layer's end as FLUSH of frame/voxel_grids.py says.
+ * It is above the end of the next grid's layer, too. */
+const float VOXEL_FLUSH_START = 0.05;
 /* Cosine: a plane along an axis has one layer of voxels however wide it is. */
 const float VOXEL_ALONG_AXIS = 0.99999;
 

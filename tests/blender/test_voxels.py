@@ -38,3 +38,16 @@ def test_moved_object_leaves_no_voxel_behind(gpu_backend):
     assert not room.level(0)[30:33, 30:33, 30:33].any()
     room.free()
     device.close()
+
+
+def test_rays_meet_a_ground_that_goes_on_outside(gpu_backend):
+    device = BlenderDevice()
+    room = Room(device, scene([FRAME, quad("ground", (0, 0, -1), (300, 0, 0), (0, 300, 0))]))
+    assert len(room.voxels.grids) == 6
+    start = np.array([(x, 0.5, 2.0) for x in (0.0, 3.0, 20.0, 200.0, 400.0)])
+    slanting = np.array([(0.6, 0.0, -0.8)] * 5)
+    found = room.ask("voxel_trace(start, direction, 1e6)", start=start, direction=slanting)
+    expected = [(2.0 - 1.0) / 0.8, *[3.0 / 0.8] * 3, -1.0]  # the first on the frame's top
+    np.testing.assert_allclose(found, expected, atol=0.1)
+    room.free()
+    device.close()

@@ -31,10 +31,12 @@ class Room:
             pass
         return self.voxels.built - before
 
-    def level(self, level: int) -> np.ndarray:
-        """(x, y, z) bool."""
-        assert self.voxels.grid is not None and self.voxels._volume is not None
-        return unpack(self.device.read(self.voxels._volume), self.voxels.grid, level)
+    def level(self, level: int, number: int = 0) -> np.ndarray:
+        """(x, y, z) bool; of an outer grid by its number."""
+        grids = self.voxels.grids
+        assert self.voxels._volume is not None
+        first = sum(grid.slices for grid in grids[:number])
+        return unpack(self.device.read(self.voxels._volume)[first:], grids[number], level)
 
     def ask(self, expression: str, **inputs) -> np.ndarray:
         return ask(self.device, self.voxels, expression, **inputs)
