@@ -128,14 +128,13 @@ CONVEX = {
 
 
 @pytest.mark.parametrize("name", CONVEX)
-@pytest.mark.parametrize("bounces", ["ONE", "MANY"])
-def test_convex_thing_under_a_uniform_sky_receives_its_radiance(studio, name, bounces):
+def test_convex_thing_under_a_uniform_sky_receives_its_radiance(studio, name):
     meshes, view = CONVEX[name]
     shown = still(meshes, world=World((1.0, 1.0, 1.0)))
-    # A box's lower rays pass its voxels: nothing is lost to its own surface but at rims, half a percent.
-    found, _ = gathered(studio, shown, view, name="diffuse_direct", vpl_bounces=bounces)
+    # A ray that grazes a box's rim meets its voxels: half a percent.
+    found, _ = gathered(studio, shown, view, name="diffuse_direct")
     assert np.nanmean(found) == pytest.approx(1.0, abs=0.01)  # noise of the mean: 0.2 %
-    assert not np.nansum(gathered(studio, shown, view, 4, vpl_bounces=bounces)[0]) > 0
+    assert not np.nansum(gathered(studio, shown, view, 4, vpl_bounces="MANY")[0]) > 0
 
 
 def test_black_ground_hides_its_part_of_the_sky(studio):
@@ -184,16 +183,16 @@ def test_emitter_shines_on_a_floor_by_its_form_factor(studio, name):
     side, height, tolerance = PANELS[name]
     lamp = (0, 0, height), (side, 0, 0), (0, -side, 0)
     shown = still([FLOOR, quad("lamp", *lamp)], materials=[GREY, emitter(2.0)])
-    found, points = gathered(studio, shown, ortho(16, 16, 1.8, (0, 0, height - 0.01)), 48, "diffuse_direct")
+    found, points = gathered(studio, shown, ortho(16, 16, 1.8, (0, 0, height - 0.01)), 24, "diffuse_direct")
     expected = 2.0 * form_factor(points, (0, 0, 1), *lamp)
     assert found.mean() == pytest.approx(expected.mean(), rel=tolerance)
-    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.15 * expected.mean()  # noise, and half a voxel at its rim
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.2 * expected.mean()  # noise, and half a voxel at its rim
 
 
 def test_large_emitter_that_touches_a_wall_is_calm_and_a_little_dark(studio):
     panel = (0, -1, 0), (1, 0, 0), (0, 1, 0)
     shown = still([UPRIGHT, quad("panel", *panel)], materials=[GREY, emitter(1.0)])
-    found, points = gathered(studio, shown, FRONT, 48, "diffuse_direct")
+    found, points = gathered(studio, shown, FRONT, 32, "diffuse_direct")
     expected = form_factor(points, (0, -1, 0), *panel)
     # Some of a ray's hits lie in a cell whose point is farther than a cell away, and give nothing.
     assert 0.95 * expected.mean() < found.mean() < 1.01 * expected.mean()
@@ -236,11 +235,8 @@ def test_furnace_is_of_one_brightness(studio, inside, direct, many):
 
 def test_white_room_grows_by_a_bounce_a_round_at_most(studio):
     lamp, rounds = light("POINT", (0, 0, 0)), MOST_WARM_UP
-    last = 0.0
-    for samples in (1, 8):
-        found = power_on_walls(studio, lamp, 1.0, 1, samples, vpl_bounces="MANY")
-        assert last < found < (rounds + samples + 1) * 100
-        last = found
+    found = power_on_walls(studio, lamp, 1.0, 1, 2, vpl_bounces="MANY")
+    assert 0.5 * rounds * 100 < found < (rounds + 3) * 100
 
 
 # --- against a gather with exact visibility --------------------------------------------------------------------------

@@ -247,7 +247,7 @@ def test_blocks_of_strength_straddle_no_tiles(headless_device, lights, resolutio
     studio.show(scene([quad("floor")], [light("SPOT", key=f"lamp {i}") for i in range(lights)]))
     sources = Sources(device)
     sources._draw = Mock()
-    for _ in sources.update_all(studio.gpu_scene, resolution, with_cache=False):
+    for _ in sources.update_all(studio.gpu_scene, resolution, with_cache=False, most=0):
         pass
     assert sources.atlas.tile % TILE_STEP == 0
     assert sources._draw.call_count == sources.light_tiles == lights
@@ -259,7 +259,7 @@ def test_sky_patches_cover_the_sphere_once(headless_device, side):
     studio = Studio(headless_device)
     studio.show(scene([quad("floor")], [], world=World((0.5, 1.0, 2.0))))
     sources = Sources(headless_device)
-    for _ in sources.update_all(studio.gpu_scene, side, with_cache=False):
+    for _ in sources.update_all(studio.gpu_scene, side, with_cache=False, most=0):
         pass
     (tile,) = sources.tiles
     x, y, width, height = sources.viewport(tile)

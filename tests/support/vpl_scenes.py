@@ -17,6 +17,7 @@ VPL = {
     "vpl_pool": 1024,
     "vpl_candidates": 8,
     "vpl_voxels": 128,
+    "vpl_cache_rows": 16,
     "vpl_bounces": "ONE",
 }
 GREY = Material("grey", (0.5, 0.5, 0.5))
