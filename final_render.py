@@ -78,7 +78,7 @@ class _FinalRender:
     def _accumulate(self, picture: Picture, result) -> None:
         """Add sample after sample until there are enough or the user cancels."""
         try:
-            while picture.samples < self.total and not self.engine.test_break():
+            while picture.lacks(self.total) and not self.engine.test_break():
                 whole = self._gpu(picture.piece)
                 self._report_progress(picture, whole)
                 if whole:

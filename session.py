@@ -61,6 +61,10 @@ class Picture:
         """Samples so far, with the part of the one under way."""
         return self.samples + self._part
 
+    def lacks(self, wanted: int) -> bool:
+        """True if it has fewer samples than that, or the newest one is still to be replaced."""
+        return self.samples < wanted or self.frame.provisional
+
     def piece(self) -> bool:
         """Do one bounded piece of GPU work; True when that completed a sample."""
         if self._pieces is None:

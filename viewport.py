@@ -47,11 +47,11 @@ class Viewport:
             return
         self._failed_for = attempt  # until it went well
         picture, wanted = self.session.picture(view, settings, SHOWN), int(settings["samples"])
-        if picture.samples < wanted:
+        if picture.lacks(wanted):
             picture.advance(SECONDS_PER_DRAW)
         picture.show()
         self._failed_for, self.error = None, ""
-        self.unfinished = picture.samples < wanted
+        self.unfinished = picture.lacks(wanted)
         self.progress = f"Sample {picture.samples}/{wanted}"
 
     def fail(self, message: str) -> None:

@@ -129,6 +129,18 @@ def test_more_samples_start_anew_and_finish(view):
     assert view.picture.samples == 5
 
 
+def test_one_sample_is_not_enough_while_maps_wait_their_turn(view):
+    view.scene.rebound.viewport_samples = view.scene.rebound.viewport_vpl_maps_at_once = 1
+    view.finish()
+    bpy.data.objects["Box"].location.x += 0.5
+    view.update()
+    view.draw()
+    status = view.viewport.session.status
+    assert status.statistics["rsm_maps_pending"] > 0 and view.viewport.unfinished
+    view.finish()
+    assert status.statistics["rsm_maps_pending"] == 0 and view.picture.samples == 1
+
+
 @pytest.mark.parametrize("size", [(1, 1), (7, 3), (129, 65)])
 def test_resized_region_gets_a_picture_of_its_size(view, size):
     view.finish()
