@@ -13,6 +13,7 @@ from ..settings import named_settings
 
 SAMPLING = ("samples", "seed")
 SHADOWS = ("shadow_resolution", "soft_shadows")
+DEBUG = ("show",)
 
 
 class ReboundPanel:
@@ -102,6 +103,7 @@ class REBOUND_PT_debug(ReboundPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
+        _draw_settings(self.layout, context.scene.rebound, _named(DEBUG))
         self.layout.operator("rebound.save_rsm_buffers")
 
 
@@ -119,6 +121,7 @@ class REBOUND_PT_light_shadow(ReboundPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.prop(context.light, "use_shadow", text="Casts Shadow")
         layout.prop(context.light, "diffuse_factor", text="Diffuse")
+        layout.prop(context.light, "specular_factor", text="Specular")
 
 
 class REBOUND_PT_object_visibility(ReboundPanel, bpy.types.Panel):
