@@ -33,7 +33,7 @@ from .index import PointIndex
 from .pool import Pool
 from .settings import SETTINGS
 from .shaders import SHADERS, VIEW_VOXELS
-from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
+from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources, emits
 from .structs import VPL_FRAME
 
 # How far a sample is after each step, for the progress bar.
@@ -127,8 +127,7 @@ class Vpl:
     def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
         """Whether some light's first or further bounces come from the cache."""
         scene = inputs.gpu_scene.scene
-        emits = any(any(material.emission) for material in scene.materials)
-        return settings["bounces"] == "MANY" or emits or any(scene.world.color)
+        return settings["bounces"] == "MANY" or emits(scene) or any(scene.world.color)
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""

@@ -39,6 +39,7 @@ class Pool:
             self._entries = tuple(self.device.texture((POOL_ROW, rows), "RGBA32F") for _ in range(4))
             self._entry_target = self.device.target(self._entries)
         positions, normals, fluxes, speculars = sources.colors
+        levels: dict[str, Any] = {f"{name}_tx": texture for name, (texture, _) in self._levels.items()}
         self.device.fullscreen(
             POOL,
             self._entry_target,
@@ -46,7 +47,7 @@ class Pool:
             normal_kind_tx=normals,
             flux_tx=fluxes,
             specular_tx=speculars,
-            **{f"{name}_tx": texture for name, (texture, _) in self._levels.items()},
+            **levels,
             tile_tx=sources.tile_table,
             pc_count=count,
             pc_seed=seed,

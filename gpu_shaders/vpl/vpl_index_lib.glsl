@@ -1,6 +1,7 @@
-/* Which point of the cache lies near: a cube of VPL_INDEX cells along a side around the scene, six sides of each cell for
- * the ways that surfaces face. `cube` is its lower corner and cells a metre. A flat texture has the six
- * sides side by side, and the cells' layers one above the other. */
+/* Which point of the cache, or of the emitters, lies near: a cube of VPL_INDEX cells along a side around the scene, six
+ * sides of each cell for the ways that surfaces face. `cube` is its lower corner and cells a metre. A flat texture has the
+ * six sides side by side, and the cells' layers one above the other. */
+#include "lib/math_lib.glsl"
 
 const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX *VPL_INDEX);
 
@@ -35,5 +36,5 @@ ivec2 index_atlas_texel(vec3 tile, int point)
 
 vec3 index_radiance(sampler2D position_area_tx, sampler2D flux_tx, ivec2 texel)
 {
-  return texelFetch(flux_tx, texel, 0).rgb / (3.14159265358979 * texelFetch(position_area_tx, texel, 0).w);
+  return texelFetch(flux_tx, texel, 0).rgb / (MATH_PI * texelFetch(position_area_tx, texel, 0).w);
 }

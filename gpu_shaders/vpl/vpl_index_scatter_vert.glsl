@@ -1,5 +1,5 @@
-/* Three vertices put one point of the cache into one cell of its index: a triangle that covers one texel's centre. Each
- * point goes, for every axis that it faces, to the side it faces. */
+/* Three vertices put one point of a tile into one cell of its index: a triangle that covers one texel's centre. Each point
+ * goes, for every axis that it faces, to the side it faces. */
 #include "vpl/vpl_index_lib.glsl"
 
 /* The least cosine to an axis with which a point counts as facing its way. */

@@ -1,5 +1,5 @@
 /* One virtual point light of this sample's pool, chosen in proportion to its strength: first the tile, then blocks of
- * 64, 16 and 4 texels, then the texel (hierarchical warping, Clarberg et al. 2005). Entry k takes the k-th of equal
+ * PYRAMID_STEP^3, ^2 and ^1 texels (64, 16, 4) along a side, then the texel (hierarchical warping, Clarberg et al. 2005). Entry k takes the k-th of equal
  * parts of the whole strength, so that the pool is stratified over the lights and over each light's map. */
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_lib.glsl"
@@ -35,6 +35,9 @@ float pool_stir(float rest, int entry, int level)
       }                                                                                                                \
     }                                                                                                                  \
   }
+
+/* Along a side of a cell of the middle level. */
+const int POOL_MIDDLE_TEXELS = PYRAMID_STEP * PYRAMID_STEP;
 
 #define POOL_COARSE(texel) texelFetch(coarse_tx, texel, 0).r
 #define POOL_MIDDLE(texel) texelFetch(middle_tx, texel, 0).r
@@ -81,17 +84,17 @@ void main()
   ivec2 first = origin / pc_tile * pc_coarse;
   ivec2 end = first + pc_coarse;
   POOL_CHOOSE(POOL_COARSE)
-  ivec2 corner = origin / 16;
-  first = corner + (cell - first) * 4;
-  end = min(first + 4, corner + pc_tile / 16);
+  ivec2 corner = origin / POOL_MIDDLE_TEXELS;
+  first = corner + (cell - first) * PYRAMID_STEP;
+  end = min(first + PYRAMID_STEP, corner + pc_tile / POOL_MIDDLE_TEXELS);
   POOL_CHOOSE(POOL_MIDDLE)
   u = pool_stir(u, entry, 1);
-  first = cell * 4;
-  end = first + 4;
+  first = cell * PYRAMID_STEP;
+  end = first + PYRAMID_STEP;
   POOL_CHOOSE(POOL_FINE)
   u = pool_stir(u, entry, 2);
-  first = cell * 4;
-  end = first + 4;
+  first = cell * PYRAMID_STEP;
+  end = first + PYRAMID_STEP;
   POOL_CHOOSE(POOL_TEXEL)
 
   float probability = POOL_TEXEL(cell) / total;
