@@ -60,7 +60,7 @@ class Frame:
     resolved_target: Target
     samples: int = 0
     follows: bool = False  # whether it was restarted, not begun
-    provisional: bool = False  # whether the next sample begins anew
+    provisional: bool = False  # whether the next sample begins anew, as the newest was made in haste
     is_glossy: bool = False  # whether there may be something in the glossy targets
 
     @property
@@ -151,7 +151,7 @@ class Renderer:
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         frame.provisional = technique is not None and technique.provisional
         self._accumulate(frame, inputs, indirect=technique is not None)
-        if technique is not None and any(view.key == settings["show"] for view in technique.views):
+        if technique is not None and any(item.key == settings["show"] for item in technique.views):
             self._show(frame, inputs, technique, settings)
         yield 1.0
 

@@ -49,7 +49,11 @@ class Setting:
 
 
 class Technique(Protocol):
-    """One way to compute indirect light. Instances hold GPU resources of one renderer and no other state."""
+    """One way to compute indirect light.
+
+    Instances hold the GPU resources of one renderer, and what the sample or picture before has found: for a frame that
+    does not follow another (``FrameInputs.follows``) the first sample is as if they were new.
+    """
 
     id: str  # "rsm"; its settings are named rsm_<setting> on scene.rebound
     label: str
