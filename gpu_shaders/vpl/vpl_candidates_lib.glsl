@@ -14,6 +14,10 @@ const float CANDIDATES_VOXELS = 2.0;
 const float CANDIDATES_TEXELS = 1.5;
 /* A point on an emitter answers for hits up to so many cells of the index away: a cell's diagonal. */
 const float CANDIDATES_CELLS = 1.75;
+/* and besides so many times the points' own spacing. */
+const float CANDIDATES_SPACING = 1.75;
+/* Cells of the cache that are asked for a hit. */
+const int CANDIDATES_ATTEMPTS = 4;
 /* A point of the cache answers for hits that lie so many cells off its plane. */
 const float CANDIDATES_OFF_PLANE = 0.5;
 
@@ -82,15 +86,21 @@ Vpl candidates_sky(vec3 direction)
   return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
 }
 
-/* Radiance that the cache holds for what a ray along `direction` hit at `hit`: that of the point whose plane the hit lies
- * on best, out of one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered,
- * so that over many rays the cells' values blend; a second try takes the hit's own. */
-vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
+/* Radiance that the cache holds for what a ray hit after `far`: that of the point whose plane the hit lies on best, out of
+ * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
+ * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do,
+ * the weakest point on the hit's own plane is taken: hidden light must not leak, as from the gap above a lamp. */
+vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise)
 {
-  for (int attempt = 0; attempt < 2 && vpl_frame.cache.z > 0.0; attempt++) {
-    vec3 place = index_place(vpl_frame.index, hit) + (attempt == 0 ? noise - 0.5 : vec3(0.0));
-    float nearest = CANDIDATES_VOXELS * voxel_edge_at(hit) + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
-    ivec2 found = ivec2(-1);
+  float edge = voxel_edge_at(hit);
+  vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
+  vec3 weakest = vec3(0.0);
+  float strength = -1.0;
+  for (int attempt = 0; attempt < CANDIDATES_ATTEMPTS && vpl_frame.cache.z > 0.0; attempt++) {
+    vec3 aside = fract(noise + float(attempt) * vec3(0.8191725, 0.6710436, 0.5497005)) - 0.5;
+    vec3 place = index_place(vpl_frame.index, hit) + aside;
+    float nearest = CANDIDATES_VOXELS * edge + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
+    ivec2 best = ivec2(-1);
     for (int axis = 0; axis < 3; axis++) {
       int point = index_point(cache_index_tx, place, index_side(axis, -direction[axis]));
       if (point < 0) {
@@ -101,18 +111,24 @@ vec3 candidates_carried(vec3 hit, vec3 direction, vec3 noise)
       float off = abs(dot(texelFetch(position_area_tx, texel, 0).xyz - hit, n));
       if (dot(n, direction) < 0.0 && off < nearest) {
         nearest = off;
-        found = texel;
+        best = texel;
       }
     }
-    if (found.x >= 0) {
-      vec3 n = texelFetch(normal_kind_tx, found, 0).xyz;
-      vec3 before = hit - 2.0 * voxel_grid.edge * direction;
-      if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, found, 0).xyz, n))) {
-        return index_radiance(position_area_tx, flux_tx, found);
-      }
+    if (best.x < 0) {
+      continue;
+    }
+    vec3 n = texelFetch(normal_kind_tx, best, 0).xyz;
+    vec3 radiance = index_radiance(position_area_tx, flux_tx, best);
+    if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, best, 0).xyz, n))) {
+      return radiance;
+    }
+    bool coplanar = nearest < CANDIDATES_VOXELS * edge;
+    if (coplanar && (strength < 0.0 || vpl_strength(radiance) < strength)) {
+      strength = vpl_strength(radiance);
+      weakest = radiance;
     }
   }
-  return vec3(0.0);
+  return weakest;
 }
 
 /* Texel of the emitter's point that answers for what a ray along `direction` hit at `hit`, or -1: the hit must lie on its
@@ -128,8 +144,9 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction)
     ivec2 texel = index_atlas_texel(vpl_frame.emitters, point);
     vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
     vec3 apart = hit - texelFetch(position_area_tx, texel, 0).xyz;
+    float area = texelFetch(position_area_tx, texel, 0).w;
     if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_edge_at(hit) &&
-        length(apart) * vpl_frame.index.w < CANDIDATES_CELLS) {
+        length(apart) < CANDIDATES_CELLS / vpl_frame.index.w + CANDIDATES_SPACING * sqrt(area)) {
       return texel;
     }
   }
@@ -202,7 +219,7 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
       vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
       vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
       emitted = candidates_emitted(P, N, hit, direction);
-      carried = candidates_carried(hit, direction, vec3(sampling_hash(pixel, seed + 3), choice.y));
+      carried = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 3), choice.y));
       int tile = (vpl_frame.kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
         seen = candidates_seen(hit, direction, tile);
