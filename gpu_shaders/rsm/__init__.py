@@ -17,10 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from ...device.interface import Device, Target, Texture
 from ...device.shader import Shader
+from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.maps import Atlas
@@ -34,7 +33,6 @@ WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
 LONGEST_LOOP = 1 << 15
 # How far a sample is after maps and coarse grid, for the progress bar.
 MAPS_DONE, COARSE_DONE = 0.2, 0.6
-STRIDES = {"HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one coarse pixel to the next, by interpolation
 Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
@@ -150,7 +148,7 @@ class Rsm:
                 yield MAPS_DONE + (1.0 - MAPS_DONE) * done
             return
         stride = STRIDES[str(settings["interpolation"])]
-        offset = _grid_offset(inputs, stride)
+        offset = grid_offset(inputs.seed, inputs.sample, stride)
         coarse, coarse_target = self._coarse_target(inputs, stride)
         self.device.clear(coarse_target)
         for done in self._gather(inputs, settings, coarse_target, self._none, stride, offset):
@@ -261,16 +259,10 @@ class Rsm:
         return reused
 
     def _coarse_target(self, inputs: FrameInputs, stride: int) -> tuple[Texture, Target]:
-        size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
+        size = grid_size(inputs.view, stride)
         if self._coarse is None or self._coarse[0].size[:2] != size:
             for old in self._coarse or ():
                 self.device.free(old)
             texture = self.device.texture(size, "RGBA32F")
             self._coarse = (texture, self.device.target([texture]))
         return self._coarse
-
-
-def _grid_offset(inputs: FrameInputs, stride: int) -> tuple[int, int]:
-    """Where the coarse grid begins: another place every sample, so that its pattern averages out."""
-    x, y = np.random.default_rng((inputs.seed, inputs.sample)).integers(0, stride, 2)
-    return int(x), int(y)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...device.interface import Device, Target, Texture
+from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
@@ -16,7 +17,6 @@ from ..technique import Value
 from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, REFLECT, REUSE, UPSAMPLE, VIEW_BOUND, VIEW_HISTORY
 from .structs import OLD_VIEW
 
-STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
 # Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
 # the scene did. A still view's mean grows without end.
 LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
@@ -115,7 +115,7 @@ class Gathering:
         ``candidates``: what vpl_candidates_lib.glsl reads.
         """
         stride = STRIDES[str(settings["scale"])]
-        offset = _offset(inputs.seed, about.number, stride)
+        offset = grid_offset(inputs.seed, about.number, stride)
         grid = self._fitting(inputs, stride)
         reuses = bool(settings["reuse"])
         self.device.fullscreen(
@@ -248,18 +248,12 @@ class Gathering:
 
     def _fitting(self, inputs: FrameInputs, stride: int) -> _Grid:
         """The grid of this picture's size, turned so that the picture before is the older of each pair."""
-        size = (-(-inputs.view.width // stride), -(-inputs.view.height // stride))
+        size = grid_size(inputs.view, stride)
         if self._grid is None or self._grid.size != size:
             self.free()
             self._grid = _new_grid(self.device, size)
         self._grid.turn()
         return self._grid
-
-
-def _offset(seed: int, sample: int, stride: int) -> tuple[int, int]:
-    """Which pixels gather: others in every sample, so that the grid averages out."""
-    x, y = np.random.default_rng((seed, sample)).integers(0, stride, 2)
-    return int(x), int(y)
 
 
 def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:

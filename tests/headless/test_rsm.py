@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from rebound.gpu_shaders.frame.coarse_grid import STRIDES
 from rebound.gpu_shaders.frame.maps import light_faces
-from rebound.gpu_shaders.rsm import STRIDES
 from rebound.scene.data import Visibility
 from rebound.settings import Settings
 from rebound.tests.support.light_reference import irradiance
