@@ -1,6 +1,7 @@
 /* One virtual point light of this sample's pool, chosen in proportion to its strength: first the tile, then blocks of
- * PYRAMID_STEP^3, ^2 and ^1 texels (64, 16, 4) along a side, then the texel (hierarchical warping, Clarberg et al. 2005). Entry k takes the k-th of equal
- * parts of the whole strength, so that the pool is stratified over the lights and over each light's map. */
+ * PYRAMID_STEP^3, ^2 and ^1 texels (64, 16, 4) along a side, then the texel (hierarchical warping, Clarberg et al. 2005).
+ * Entry k takes the k-th of equal parts of the whole strength, so that the pool is stratified over the lights and over
+ * each light's map. */
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_lib.glsl"
 #include "vpl/vpl_strength_lib.glsl"
