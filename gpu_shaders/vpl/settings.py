@@ -136,6 +136,7 @@ SETTINGS = (
         0.25,
         minimum=0.0,
         maximum=1.0,
+        unit="roughness",
     ),
     Setting(
         "occlusion",
