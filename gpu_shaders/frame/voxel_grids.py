@@ -84,13 +84,20 @@ class OuterGrid(VoxelGrid):
         self.size = np.ceil((bounds[1] - self.origin) / edge + FLUSH).astype(int)
 
 
+# A huge object this flat is a ground; any other may be the room around what is left, which is worth voxels as long as
+# it is not so many times larger still.
+FLAT, SHELL = 0.1, 4.0
+
+
 def grid_bounds(boxes: np.ndarray) -> np.ndarray:
     """(2, 3) around the boxes (n, 2, 3), without a few huge ones that would take nearly all voxels."""
-    order = np.argsort((boxes[:, 1] - boxes[:, 0]).max(1))
+    extents = boxes[:, 1] - boxes[:, 0]
+    order = np.argsort(extents.max(1))
     bounds, shrink = _around(boxes), math.sqrt(WORTHWHILE_SHRINK)
     for left_out in range(1, min(MOST_HUGE_OBJECTS, len(order) - 1) + 1):
         kept = _around(boxes[order[:-left_out]])
-        if _longest(bounds) > shrink * _longest(kept) > 0.0:
+        flat = extents[order[-left_out]].min() < FLAT * extents[order[-left_out]].max()
+        if _longest(bounds) > (shrink if flat else shrink * SHELL) * _longest(kept) > 0.0:
             bounds, shrink = kept, FURTHER_SHRINK
     return bounds
 

@@ -131,13 +131,13 @@ class Vpl:
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
-        count, seed = int(settings["pool"]), inputs.noise_seed(1) + 64 * self._picture
+        count, seed = int(settings["pool"]), inputs.noise_seed(1)
         if self._sorted != self.sources.revision:
             self._sort_points()
             self._sorted = self.sources.revision
         tile = self.sources.tile_of(CACHE)
         if tile is None:
-            self.pool.draw(self.sources, count, seed)
+            self.pool.draw(self.sources, count, MOST_WARM_UP * self._picture, seed)
             return
         many = settings["bounces"] == "MANY"
         bounces = _bounces(inputs.gpu_scene.scene) if many else 1
@@ -149,12 +149,13 @@ class Vpl:
             self._cache_updates = float(1 - bounces)
         for number in range(rounds):
             self.cache.emit(self.sources, tile)
-            self.pool.draw(self.sources, count, seed + number)
+            update = MOST_WARM_UP * self._picture + number
+            self.pool.draw(self.sources, count, update, seed)
             candidates = self._candidates(
                 inputs,
                 settings,
                 kinds=ALL_KINDS if many else FIRST_HAND,
-                number=MOST_WARM_UP * self._picture + number,
+                number=update,
             )
             counting = max(self._cache_updates, 0.0) * (NEWER if many else 1.0)
             self.cache.gather(self.sources, tile, candidates, rows, counting, inputs.gpu_scene.is_glossy)
@@ -211,6 +212,8 @@ class Vpl:
             "pool": int(settings["pool"]),
             "emitters": self._points(EMITTERS),
             "tiles": len(self.sources.tiles),
+            "emitter_tile": self.sources.index_of(EMITTERS),
+            "sky_tile": self.sources.index_of(SKY_PATCHES),
             "light_tiles": self.sources.light_tiles,
             "candidates": int(settings["candidates"]),
             "occluded": int(settings["occlusion"] != "NONE"),

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...device.interface import Device, Target, Texture
-from .shaders import LUMINANCE, POOL, POOL_ROW, REDUCE, TILES
+from .shaders import LUMINANCE, POOL, POOL_ROW, REDUCE, TILE_STRENGTH, TILES
 from .sources import TILE_STEP, Sources
 from .structs import PYRAMID_STEP
 
@@ -29,8 +29,8 @@ class Pool:
         self._entry_target: Target | None = None
         self._revision = -1
 
-    def draw(self, sources: Sources, count: int, seed: int) -> None:
-        """Choose ``count`` entries; ``seed`` is another one in every sample."""
+    def draw(self, sources: Sources, count: int, number: int, seed: int) -> None:
+        """Choose ``count`` entries; ``number`` is another one in every sample."""
         assert sources.atlas is not None
         self._measure(sources)
         rows = -(-count // POOL_ROW)
@@ -40,6 +40,7 @@ class Pool:
             self._entry_target = self.device.target(self._entries)
         positions, normals, fluxes, speculars = sources.colors
         levels: dict[str, Any] = {f"{name}_tx": texture for name, (texture, _) in self._levels.items()}
+        del levels["strength_tx"]  # of whole tiles: their sums have it
         self.device.fullscreen(
             POOL,
             self._entry_target,
@@ -50,6 +51,7 @@ class Pool:
             **levels,
             tile_tx=sources.tile_table,
             pc_count=count,
+            pc_number=number,
             pc_seed=seed,
             pc_tiles=len(sources.tiles),
             pc_light_tiles=sources.light_tiles,
@@ -75,7 +77,8 @@ class Pool:
         columns, rows = (side // tile for side in sources.atlas.size)
         sides = {"fine": tile // FINE, "middle": tile // MIDDLE, "coarse": blocks}
         sizes = {name: (columns * side, rows * side) for name, side in sides.items()}
-        self._allocate({**sizes, "sums": (len(sources.tiles), 1)})
+        count = len(sources.tiles)
+        self._allocate({**sizes, "strength": (count, 1), "sums": (count, 1)})
         self._revision = sources.revision
         fluxes, speculars = sources.colors[2:4]
         self.device.fullscreen(LUMINANCE, self._levels["fine"][1], flux_tx=fluxes, specular_tx=speculars)
@@ -88,12 +91,19 @@ class Pool:
                 pc_parents=sides[parent],
             )
         self.device.fullscreen(
-            TILES,
-            self._levels["sums"][1],
+            TILE_STRENGTH,
+            self._levels["strength"][1],
             level_tx=self._levels["coarse"][0],
             tile_tx=sources.tile_table,
             pc_tile=tile,
             pc_blocks=blocks,
+        )
+        self.device.fullscreen(
+            TILES,
+            self._levels["sums"][1],
+            strength_tx=self._levels["strength"][0],
+            tile_tx=sources.tile_table,
+            pc_tiles=count,
             pc_light_tiles=sources.light_tiles,
         )
 

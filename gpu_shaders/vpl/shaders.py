@@ -38,13 +38,22 @@ REDUCE = Shader(
     defines=_DEFINES,
 )
 
+TILE_STRENGTH = Shader(
+    name="vpl_tile_strength",
+    fragment="vpl/vpl_tile_strength_frag.glsl",
+    outputs={"out_sum": "VEC4"},
+    samplers={"level_tx": "FLOAT_2D", "tile_tx": "FLOAT_2D"},
+    structs=(TILE,),
+    constants={"pc_tile": "INT", "pc_blocks": "INT"},
+)
+
 TILES = Shader(
     name="vpl_tiles",
     fragment="vpl/vpl_tiles_frag.glsl",
     outputs={"out_tile": "VEC4"},
-    samplers={"level_tx": "FLOAT_2D", "tile_tx": "FLOAT_2D"},
+    samplers={"strength_tx": "FLOAT_2D", "tile_tx": "FLOAT_2D"},
     structs=(TILE,),
-    constants={"pc_tile": "INT", "pc_blocks": "INT", "pc_light_tiles": "INT"},
+    constants={"pc_tiles": "INT", "pc_light_tiles": "INT"},
 )
 
 # The atlas, as every pass behind it reads it.
@@ -70,6 +79,7 @@ POOL = Shader(
     structs=(TILE,),
     constants={
         "pc_count": "INT",
+        "pc_number": "INT",
         "pc_seed": "INT",
         "pc_tiles": "INT",
         "pc_light_tiles": "INT",
@@ -254,6 +264,7 @@ SHADERS = (
     SKY,
     LUMINANCE,
     REDUCE,
+    TILE_STRENGTH,
     TILES,
     POOL,
     *GATHER.values(),

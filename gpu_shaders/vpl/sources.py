@@ -66,6 +66,10 @@ class Sources(ReflectiveShadowMaps):
         """The tile of emitters, cache or sky, if there is one."""
         return next((tile for tile in reversed(self.tiles) if tile.owner == owner), None)
 
+    def index_of(self, owner: str) -> int:
+        """That tile's number, -1 where there is none."""
+        return next((index for index, tile in enumerate(self.tiles) if tile.owner == owner), -1)
+
     @property
     def light_tiles(self) -> int:
         """How many tiles are lights': they come first."""

@@ -1,6 +1,9 @@
 /* Some rounds of gathering at one point of the cache: irradiance / pi from the pool, and their number. */
 #include "vpl/vpl_candidates_lib.glsl"
 
+/* Where the points' noise begins, beyond any picture's pixels. */
+const ivec2 CACHE_PIXEL = ivec2(1 << 20, 0);
+
 void main()
 {
   ivec2 point = ivec2(gl_FragCoord.xy);
@@ -15,7 +18,7 @@ void main()
     bool visible;
     vec3 carried;
     vec3 emitted;
-    Reservoir r = candidates_choose(place.xyz, N, N, N, point, i, visible, carried, emitted);
+    Reservoir r = candidates_choose(place.xyz, N, N, N, point + CACHE_PIXEL, i, visible, carried, emitted);
     vec3 light = candidates_light(r, visible, place.xyz, N, N, N);
     out_sum += vec4(light + emitted + ((vpl_frame.kinds >> SOURCE_CACHE & 1) != 0 ? carried : vec3(0.0)), 1.0);
   }

@@ -21,10 +21,11 @@ const int CANDIDATES_ATTEMPTS = 4;
 /* A point of the cache answers for hits that lie so many cells off its plane. */
 const float CANDIDATES_OFF_PLANE = 0.5;
 
-/* Strength of all sources. */
-float candidates_total()
+/* Probability with which one entry of the pool is a light of that strength of this tile. */
+float candidates_probability(int tile, float strength)
 {
-  return texelFetch(sums_tx, ivec2(vpl_frame.tiles - 1, 0), 0).y;
+  float total = texelFetch(sums_tx, ivec2(vpl_frame.tiles - 1, 0), 0).y;
+  return texelFetch(sums_tx, ivec2(tile, 0), 0).x * strength / total;
 }
 
 vec3 candidates_cosine_direction(vec3 n, vec2 noise)
@@ -57,11 +58,12 @@ int candidates_lamp(float u, out float share)
 }
 
 /* The texel that shows what a ray along `direction` hit at `hit`, in the map of one light; id 0 where the light does not
- * reach it. */
-Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index)
+ * reach it. `seen_tile`: the map that was asked. */
+Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index, out int seen_tile)
 {
   Light light = light_fetch(light_tx, int(vpl_tile_fetch(tile_tx, tile_index).light));
-  MapFace face = map_face_fetch(face_tx, light_map_face(light, face_tx, hit));
+  seen_tile = light_map_face(light, face_tx, hit); /* tiles and faces have one order */
+  MapFace face = map_face_fetch(face_tx, seen_tile);
   vec3 p = map_position(face, hit);
   if (!map_holds(face, p)) {
     return VPL_NONE;
@@ -166,7 +168,8 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
   vec3 flux = texelFetch(flux_tx, texel, 0).rgb;
   vec3 to_hit = hit - P;
   float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
-  float by_pool = float(vpl_frame.candidates) * vpl_strength(flux) / (candidates_total() * area);
+  float by_pool =
+      float(vpl_frame.candidates) * candidates_probability(vpl_frame.emitter_tile, vpl_strength(flux)) / area;
   return flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
 }
 
@@ -214,6 +217,7 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
     vec3 origin = voxel_start_seen(P, geometric, seen_from);
     float far = voxel_trace(origin, direction, 1e30);
     float share = 1.0;
+    int seen_tile = 0;
     Vpl seen = VPL_NONE;
     if (far >= 0.0) {
       vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
@@ -222,17 +226,18 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
       carried = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 3), choice.y));
       int tile = (vpl_frame.kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
-        seen = candidates_seen(hit, direction, tile);
+        seen = candidates_seen(hit, direction, tile, seen_tile);
       }
     } else if (vpl_frame.sky.z > 0.0) {
       seen = candidates_sky(direction);
+      seen_tile = vpl_frame.sky_tile;
     }
     float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
     vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
     float target = vpl_strength(toward) * form;
     if (seen.id != 0 && target > 0.0) {
-      float by_pool =
-          candidates * seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb)) / candidates_total();
+      float strength = seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb));
+      float by_pool = candidates * candidates_probability(seen_tile, strength);
       float by_ray = share * seen.area * form * (1.0 / MATH_PI);
       int before = r.id;
       float sum = r.sum;

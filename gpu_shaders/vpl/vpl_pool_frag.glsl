@@ -6,10 +6,13 @@
 #include "vpl/vpl_lib.glsl"
 #include "vpl/vpl_strength_lib.glsl"
 
+/* Random numbers of one entry in one pool. */
+const int POOL_CHOICES = 4;
+
 /* A number in [0, 1) that still has random bits after many choices: what is left of the last, stirred. */
 float pool_stir(float rest, int entry, int level)
 {
-  return fract(rest + sampling_hash(ivec2(entry, level), pc_seed).x);
+  return fract(rest + sampling_hash(ivec2(entry, POOL_CHOICES * pc_number + level), pc_seed).x);
 }
 
 /* Take one of the cells in [first, end) of one level in proportion to its strength. `u` in [0, 1) chooses; it is
@@ -73,13 +76,14 @@ void main()
   if (entry >= pc_count || total <= 0.0) {
     return;
   }
-  float u = (float(entry) + sampling_hash(ivec2(entry, 7), pc_seed).y) / float(pc_count);
+  float u = (float(entry) + sampling_hash(ivec2(entry, POOL_CHOICES * pc_number), pc_seed).y) / float(pc_count);
   float wanted = min(u, 0.99999994) * total;
   int index = pool_tile(wanted);
   vec4 sums = texelFetch(sums_tx, ivec2(index, 0), 0);
   VplTile tile = vpl_tile_fetch(tile_tx, index);
   ivec2 origin = ivec2(tile.origin);
-  u = clamp(1.0 - (sums.y - wanted) / max(sums.x, 1e-30), 0.0, 0.99999994);
+  float before = index > 0 ? texelFetch(sums_tx, ivec2(index - 1, 0), 0).y : 0.0;
+  u = clamp((wanted - before) / max(sums.y - before, 1e-30), 0.0, 0.99999994);
 
   ivec2 cell = ivec2(0);
   ivec2 first = origin / pc_tile * pc_coarse;
@@ -98,7 +102,7 @@ void main()
   end = first + PYRAMID_STEP;
   POOL_CHOOSE(POOL_TEXEL)
 
-  float probability = POOL_TEXEL(cell) / total;
+  float probability = sums.x * POOL_TEXEL(cell) / total;
   if (probability <= 0.0) {
     return;
   }

@@ -44,7 +44,8 @@ void main()
   float share;
   int tile = candidates_lamp(choice.x, share);
   if (tile >= 0) {
-    Vpl seen = candidates_seen(hit, direction, tile);
+    int seen_tile;
+    Vpl seen = candidates_seen(hit, direction, tile, seen_tile);
     light += seen.id != 0 ? vpl_radiance(seen, -direction) / share : vec3(0.0);
   }
   out_indirect = vec4(weight * light, 1.0);

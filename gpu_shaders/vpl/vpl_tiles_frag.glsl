@@ -1,30 +1,29 @@
-/* Strength of every tile, and of all tiles up to and with it: what a tile is chosen by. One texel a tile; (tile, sum so
- * far, of lights only so far, of all tiles of its owner). */
-
-float tiles_sum(int index)
-{
-  VplTile tile = vpl_tile_fetch(tile_tx, index);
-  ivec2 first = ivec2(tile.origin) / pc_tile * pc_blocks;
-  float sum = 0.0;
-  for (int i = 0; i < pc_blocks * pc_blocks; i++) {
-    sum += texelFetch(level_tx, first + ivec2(i % pc_blocks, i / pc_blocks), 0).r;
-  }
-  return sum;
-}
+/* What tiles are chosen by: their strength and, so that a strong lamp outside does not take all from a weak one inside, as
+ * much again shared evenly among those that send anything. One texel a tile: (this weight over the strength; the sum of
+ * weights so far; the same of lights only; that of all tiles of its owner). */
 
 void main()
 {
   int index = int(gl_FragCoord.x);
   VplTile own = vpl_tile_fetch(tile_tx, index);
+  float strengths = 0.0;
+  float sending = 0.0;
+  for (int i = 0; i < pc_tiles; i++) {
+    float strength = texelFetch(strength_tx, ivec2(i, 0), 0).r;
+    strengths += strength;
+    sending += strength > 0.0 ? 1.0 : 0.0;
+  }
+  float even = strengths / max(sending, 1.0);
   float all = 0.0;
   float lights = 0.0;
   float owner = 0.0;
-  float sum = 0.0;
   for (int i = 0; i < max(index + 1, own.first + own.owned); i++) {
-    sum = tiles_sum(i);
-    all += i <= index ? sum : 0.0;
-    lights += i <= index && i < pc_light_tiles ? sum : 0.0;
-    owner += i >= own.first && i < own.first + own.owned ? sum : 0.0;
+    float strength = texelFetch(strength_tx, ivec2(i, 0), 0).r;
+    float weight = strength > 0.0 ? strength + even : 0.0;
+    all += i <= index ? weight : 0.0;
+    lights += i <= index && i < pc_light_tiles ? weight : 0.0;
+    owner += i >= own.first && i < own.first + own.owned ? weight : 0.0;
   }
-  out_tile = vec4(tiles_sum(index), all, lights, owner);
+  float strength = texelFetch(strength_tx, ivec2(index, 0), 0).r;
+  out_tile = vec4(strength > 0.0 ? 1.0 + even / strength : 0.0, all, lights, owner);
 }
