@@ -20,6 +20,9 @@ from .structs import OLD_VIEW
 # Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
 # the scene did. A still view's mean grows without end.
 LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
+# Samples after an edit, that of the edit included, whose mean stays short. One alone would leave the old light
+# 1 / (n + 1) of the mean after n samples; four leave it 1 / 16, and then a part of that which falls as 1 / n.
+SETTLING = 4
 # Samples that an old reservoir may stand for.
 MOST_REUSE = 2.0
 # Distances between the texels that one pass of the filter compares.
@@ -101,6 +104,7 @@ class Gathering:
         self.device = device
         self._grid: _Grid | None = None
         self._before: _Before | None = None
+        self._settling = 0  # samples to come whose mean stays short
 
     def draw(
         self,
@@ -167,7 +171,7 @@ class Gathering:
 
     def forget(self) -> None:
         """Know nothing of the picture before."""
-        self._before = None
+        self._before, self._settling = None, 0
 
     def free(self) -> None:
         for resource in self._grid.resources if self._grid else ():
@@ -179,9 +183,9 @@ class Gathering:
         history = reuse = 0.0
         if before is not None:
             still = inputs.sample > 0
-            history = (
-                ENDLESS if still else LONG_HISTORY if before.scene_revision == now.scene_revision else SHORT_HISTORY
-            )
+            edited = before.scene_revision != now.scene_revision
+            self._settling = SETTLING if edited else max(self._settling - 1, 0)
+            history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
             # Samples of a still view are to be independent, or their mean would converge more slowly.
             reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
         self.device.fullscreen(
