@@ -90,14 +90,12 @@ Vpl candidates_sky(vec3 direction)
 
 /* Radiance that the cache holds for what a ray hit after `far`: that of the point whose plane the hit lies on best, out of
  * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
- * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do,
- * the weakest point on the hit's own plane is taken: hidden light must not leak, as from the gap above a lamp. */
+ * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, light is lost
+ * rather than taken from what is hidden, or it would pass walls. */
 vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise)
 {
   float edge = voxel_edge_at(hit);
   vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
-  vec3 weakest = vec3(0.0);
-  float strength = -1.0;
   for (int attempt = 0; attempt < CANDIDATES_ATTEMPTS && vpl_frame.cache.z > 0.0; attempt++) {
     vec3 aside = fract(noise + float(attempt) * vec3(0.8191725, 0.6710436, 0.5497005)) - 0.5;
     vec3 place = index_place(vpl_frame.index, hit) + aside;
@@ -120,17 +118,11 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise)
       continue;
     }
     vec3 n = texelFetch(normal_kind_tx, best, 0).xyz;
-    vec3 radiance = index_radiance(position_area_tx, flux_tx, best);
     if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, best, 0).xyz, n))) {
-      return radiance;
-    }
-    bool coplanar = nearest < CANDIDATES_VOXELS * edge;
-    if (coplanar && (strength < 0.0 || vpl_strength(radiance) < strength)) {
-      strength = vpl_strength(radiance);
-      weakest = radiance;
+      return index_radiance(position_area_tx, flux_tx, best);
     }
   }
-  return weakest;
+  return vec3(0.0);
 }
 
 /* Texel of the emitter's point that answers for what a ray along `direction` hit at `hit`, or -1: the hit must lie on its
