@@ -122,8 +122,10 @@ def test_a_huge_ground_does_not_take_the_voxels(room):
 
 
 def test_huge_objects_are_left_out_of_the_box_only_where_that_gains_much():
-    def boxes(*sizes):
-        return np.array([[(-size,) * 3, (size,) * 3] for size in sizes], np.float64)
+    def boxes(*sizes, flat=True):
+        height = 0.04 if flat else 1.0
+        corners = [np.array((size, size, height * size)) for size in sizes]
+        return np.array([(-corner, corner) for corner in corners], np.float64)
 
     assert grid_bounds(boxes(1, 1, 1, 5.9))[1, 0] == 5.9
     assert grid_bounds(boxes(1, 1, 1, 6.1))[1, 0] == 1
@@ -131,6 +133,9 @@ def test_huge_objects_are_left_out_of_the_box_only_where_that_gains_much():
     assert grid_bounds(boxes(1, 1, 1.9, 100))[1, 0] == 1.9
     assert grid_bounds(boxes(1, 20, 20, 20, 20, 20))[1, 0] == 20
     assert grid_bounds(boxes(0))[1, 0] == 0
+    # What is not flat may be the room around the rest.
+    assert grid_bounds(boxes(1, 1, 23, flat=False))[1, 0] == 23
+    assert grid_bounds(boxes(1, 1, 25, flat=False))[1, 0] == 1
 
 
 # --- rays ------------------------------------------------------------------------------------------------------------

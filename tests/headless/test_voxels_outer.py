@@ -248,7 +248,7 @@ def test_black_ground_hides_its_part_of_the_sky(studio, half):
     shown = still([ground(half), BLOCK], materials=[BLACK, GREY], world=World((1.0, 1.0, 1.0)))
     found, points = gathered(studio, shown, FRONT, 24, "diffuse_direct")
     hidden = form_factor(points, (0, -1, 0), (0, -half / 2, 0), (half, 0, 0), (0, half / 2, 0))
-    assert found.mean() == pytest.approx(1 - hidden.mean(), rel=0.03)
+    assert found.mean() == pytest.approx(1 - hidden.mean(), rel=0.05)  # noise of the mean: 1.5 %
 
 
 @pytest.mark.parametrize("half", HALVES)

@@ -94,6 +94,20 @@ class FakeAtlas:
     def tile_sums(self) -> np.ndarray:
         return np.array([self.strengths[self.part(index)].sum() for index in range(len(self.tiles))])
 
+    def tile_weights(self) -> np.ndarray:
+        """What tiles are chosen by: their strength, and as much again evenly among those that send anything."""
+        sums = self.tile_sums()
+        return np.where(sums > 0, sums + sums.sum() / max((sums > 0).sum(), 1), 0.0)
+
+    def chances(self) -> np.ndarray:
+        """The probability of every texel."""
+        chance = np.zeros(self.strengths.shape)
+        sums, weights = self.tile_sums(), self.tile_weights()
+        for index in np.flatnonzero(sums):
+            part = self.part(index)
+            chance[part] = self.strengths[part] / sums[index] * weights[index] / weights.sum()
+        return chance
+
     def free(self) -> None:
         for texture in (*self.colors, self.tile_table):
             self.device.free(texture)
@@ -102,10 +116,10 @@ class FakeAtlas:
 class Drawn:
     """The entries of one or more draws: where in the atlas, and what the pool says of them."""
 
-    def __init__(self, pool: Pool, sources, count: int, seeds=(1,)) -> None:
+    def __init__(self, pool: Pool, sources, count: int, numbers=(1,)) -> None:
         found = []
-        for seed in seeds:
-            pool.draw(sources, count, seed)
+        for number in numbers:
+            pool.draw(sources, count, number, 0)
             textures = list(pool.bindings().values())[:3]
             found.append([pool.device.read(t).reshape(-1, 4)[:count] for t in textures])
         self.position, self.facing, self.flux = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -131,8 +145,7 @@ def atlas(request, headless_device):
 
 def test_entries_are_texels_with_their_probability(pool, atlas):
     drawn = Drawn(pool, atlas, 3001)  # no whole row
-    strengths = atlas.strengths
-    expected = strengths[drawn.y, drawn.x] / strengths.sum()
+    expected = atlas.chances()[drawn.y, drawn.x]
     assert (expected > 0).all()
     np.testing.assert_allclose(drawn.probability, expected, rtol=1e-5)
     for found, name in ((drawn.position, "position_area"), (drawn.flux[:, :3], "flux")):
@@ -149,26 +162,26 @@ def test_entries_are_texels_with_their_probability(pool, atlas):
 def test_rays_find_lights_as_often_as_entries_say(pool, atlas):
     """A ray that hits something asks one light, in proportion to what all its tiles send; others are always found."""
     drawn = Drawn(pool, atlas, 2048)
-    sums = atlas.tile_sums()
-    lights = sums[: atlas.light_tiles].sum()
+    sums, weights = atlas.tile_sums(), atlas.tile_weights()
+    lights = weights[: atlas.light_tiles].sum()
     share = np.zeros(atlas.strengths.shape)
     for index in range(len(atlas.tiles)):
         owner = np.s_[atlas.firsts[index] : atlas.firsts[index] + atlas.owned[index]]
-        share[atlas.part(index)] = sums[owner].sum() / lights if index < atlas.light_tiles else 1.0
+        share[atlas.part(index)] = weights[owner].sum() / lights if index < atlas.light_tiles else 1.0
     np.testing.assert_allclose(drawn.facing[:, 2], share[drawn.y, drawn.x], rtol=1e-4)
     sums_read = pool.device.read(pool.bindings()["sums_tx"])[0].astype(np.float64)
-    np.testing.assert_allclose(sums_read[:, 0], sums, rtol=1e-5)
-    np.testing.assert_allclose(sums_read[:, 1], np.cumsum(sums), rtol=1e-5)
-    np.testing.assert_allclose(sums_read[: atlas.light_tiles, 2], np.cumsum(sums)[: atlas.light_tiles], rtol=1e-5)
+    over = np.divide(weights, sums, out=np.zeros_like(sums), where=sums > 0)
+    np.testing.assert_allclose(sums_read[:, 0], over, rtol=1e-4)
+    np.testing.assert_allclose(sums_read[:, 1], np.cumsum(weights), rtol=1e-5)
+    np.testing.assert_allclose(sums_read[: atlas.light_tiles, 2], np.cumsum(weights)[: atlas.light_tiles], rtol=1e-5)
 
 
 def test_entries_are_chosen_in_proportion_to_strength(pool, atlas):
     count, draws = 4096, 12
     drawn = Drawn(pool, atlas, count, range(100, 100 + draws))
-    strengths = atlas.strengths
-    found = np.zeros(strengths.shape)
+    found = np.zeros(atlas.strengths.shape)
     np.add.at(found, (drawn.y, drawn.x), 1)
-    expected = strengths / strengths.sum() * count * draws
+    expected = atlas.chances() * count * draws
     # Texels of which few are expected are taken together, in the order in which they lie.
     flat, hits = expected.ravel(), found.ravel()
     assert not hits[flat == 0].any()
@@ -182,7 +195,7 @@ def test_entries_are_chosen_in_proportion_to_strength(pool, atlas):
 
 
 def test_entries_are_stratified_over_tiles(pool, atlas):
-    sums = atlas.tile_sums()
+    sums = atlas.tile_weights()
     for count in (64, 1000):
         drawn = Drawn(pool, atlas, count)
         slots = drawn.x // atlas.atlas.tile + drawn.y // atlas.atlas.tile * atlas.atlas.columns

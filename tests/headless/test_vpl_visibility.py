@@ -95,7 +95,7 @@ def split(lamps):
 def test_light_split_into_many_bounces_as_one(studio):
     one, _ = gathered(studio, split([SPOT]), VIEW, 64)
     many, _ = gathered(studio, split(PARTS), VIEW, 64)
-    assert many.mean() == pytest.approx(one.mean(), rel=0.01)
+    assert many.mean() == pytest.approx(one.mean(), rel=0.02)  # noise of each mean: about 0.6 %
     # Rays ask one of the lights, which all show the same: each answers for a 64th, and the pool for the rest.
     difference = np.sqrt(np.mean((many - one) ** 2)) / one.mean()
     halves = [gathered(studio, split([SPOT]), VIEW, 64, seed=seed)[0] for seed in (1, 2)]
@@ -145,8 +145,8 @@ def test_work_of_a_sample_knows_no_lights(headless_device, monkeypatch, bounces)
 
 
 def test_power_in_one_of_many_lights_is_found(studio):
-    """63 dim ones and a bright one: the pool is where the light is."""
+    """63 dim ones and a bright one: half of the pool, at least, is where the light is."""
     lamps = [replace(p, power=(1e-4,) * 3) for p in PARTS[:-1]] + [replace(PARTS[-1], power=SPOT.power)]
-    one, _ = gathered(studio, split([SPOT]), VIEW, 32)
-    found, _ = gathered(studio, split(lamps), VIEW, 32)
-    assert found.mean() == pytest.approx(one.mean(), rel=0.01)
+    one, _ = gathered(studio, split([SPOT]), VIEW, 96)
+    found, _ = gathered(studio, split(lamps), VIEW, 96)
+    assert found.mean() == pytest.approx(one.mean(), rel=0.03)  # noise of each mean: about 1 %
