@@ -59,7 +59,7 @@ class Truth:
         found = {}
         for goal in self.goals:
             reference = self.references[goal.reference]
-            direct = diffuse(reference, "Direct") if "Diffuse Color" in reference else None
+            direct = diffuse(reference, "Direct") if {"Diffuse Color", "Diffuse Direct"} <= reference.keys() else None
             wanted, test = quantity(reference, goal.quantity), quantity(passes, goal.quantity, direct)
             if wanted is not None and test is not None:
                 found[goal.key] = scores(wanted, test)

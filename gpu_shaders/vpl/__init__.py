@@ -44,6 +44,8 @@ LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
 # Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
 # part of them.
 NEWER = 0.5
+# Pictures after an edit in which all points of the cache gather, that old light may go at once.
+SETTLING = 4
 # Updates after which no more points come to light that had none, so that the index of them stays as it is.
 COME_TO_LIGHT = 4.0
 ALL_KINDS = sum(1 << kind for kind in SourceKind)
@@ -76,6 +78,7 @@ class Vpl:
         self._settings: Mapping[str, Value] = {}  # of the last sample
         self._picture = 0  # number of the sample in its sequence of noise
         self._cache_updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
+        self._edited = 0  # picture in which the scene last changed
         self._cache_revision = -1  # of the scene that the cache last gathered in
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
@@ -145,8 +148,10 @@ class Vpl:
         if self._cache_revision < 0:
             rounds, rows = bounces, POINTS_SIDE
         if self._cache_revision != inputs.gpu_scene.revision:
-            self._cache_revision = inputs.gpu_scene.revision
+            self._cache_revision, self._edited = inputs.gpu_scene.revision, self._picture
             self._cache_updates = float(1 - bounces)
+        if self._picture - self._edited < SETTLING:
+            rows = POINTS_SIDE
         for number in range(rounds):
             self.cache.emit(self.sources, tile)
             update = MOST_WARM_UP * self._picture + number

@@ -6,13 +6,16 @@
 #include "vpl/vpl_lib.glsl"
 #include "vpl/vpl_strength_lib.glsl"
 
-/* Random numbers of one entry in one pool. */
-const int POOL_CHOICES = 4;
+/* A seed for each pool: mixed, for there are more pools than seeds set apart for them. */
+int pool_seed()
+{
+  return pc_seed ^ int(sampling_pcg3d(uvec3(uint(pc_number), 0u, 0u)).x >> 2u);
+}
 
 /* A number in [0, 1) that still has random bits after many choices: what is left of the last, stirred. */
 float pool_stir(float rest, int entry, int level)
 {
-  return fract(rest + sampling_hash(ivec2(entry, POOL_CHOICES * pc_number + level), pc_seed).x);
+  return fract(rest + sampling_hash(ivec2(entry, level), pool_seed()).x);
 }
 
 /* Take one of the cells in [first, end) of one level in proportion to its strength. `u` in [0, 1) chooses; it is
@@ -76,7 +79,7 @@ void main()
   if (entry >= pc_count || total <= 0.0) {
     return;
   }
-  float u = (float(entry) + sampling_hash(ivec2(entry, POOL_CHOICES * pc_number), pc_seed).y) / float(pc_count);
+  float u = (float(entry) + sampling_hash(ivec2(entry, 0), pool_seed()).y) / float(pc_count);
   float wanted = min(u, 0.99999994) * total;
   int index = pool_tile(wanted);
   vec4 sums = texelFetch(sums_tx, ivec2(index, 0), 0);

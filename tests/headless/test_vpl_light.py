@@ -155,7 +155,7 @@ def test_ground_to_the_horizon_hides_half_of_the_sky(studio, half):
     block = box("block", (-0.5, 0, 0), (0.5, 1, 1))
     shown = still([ground, block], materials=[BLACK, GREY], world=SKY)
     found, _ = gathered(studio, shown, FRONT, 16, "diffuse_direct")
-    assert found.mean() == pytest.approx(0.5, abs=0.06)  # at 5 m a little more
+    assert found.mean() == pytest.approx(0.5, abs=0.08)  # by its form factor 0.551 at 5 m; noise of the mean 2 %
 
 
 @pytest.mark.parametrize("half", [5.0, 40.0])
