@@ -73,7 +73,9 @@ def measure_scene(case: Case, plan: Plan, folder: Path, say: Say = print) -> Sce
     snapshot = do([Job(str(case.blend), size=truth.size)], kept, say)[0]
     scene, view = load_snapshot(snapshot.file)
     pictures = _Pictures(folder, case.name)
-    curves = [_rebound(m, scene, view, truth, plan, pictures, say) for m in methods(estimators=plan.estimators)]
+    many = "multi_bounce" in truth.references
+    rebound = methods(estimators=plan.estimators, many_bounces=many)
+    curves = [_rebound(m, scene, view, truth, plan, pictures, say) for m in rebound]
     curves += _final_renders(truth, plan, kept, pictures, say)
     curves += _blender(truth, plan, kept, pictures, say)
     return SceneResult(
@@ -221,7 +223,7 @@ def frame_passes(device: Device, scene: Scene, view: View, settings: Settings, f
 def _final_renders(truth: Truth, plan: Plan, kept: Path, pictures: _Pictures, say: Say) -> list[Curve]:
     """Rebound as an artist's F12 has it, with reading the scene and filling the passes: the ladder's two ends."""
     curves = []
-    for method in methods():
+    for method in methods(many_bounces="multi_bounce" in truth.references):
         counts = (plan.rebound[0], plan.rebound[-1])
         job = Job(str(truth.case.blend), REBOUND, size=truth.size, settings=dict(method.changed))
         jobs = [replace(job, cold=True), *(replace(job, samples=n, runs=plan.runs) for n in counts)]
