@@ -244,6 +244,8 @@ def _missing(scene: Scene) -> tuple[str, ...]:
     """A line for what makes a picture empty or dark though nothing is wrong with it."""
     if not scene.instances:
         return ("The scene has nothing to draw: the picture shows the background only",)
-    if not scene.lights:
-        return ("The scene has no light: the picture shows emission and the background only",)
+    used = {index for instance in scene.instances for index in instance.materials}
+    shines = any(scene.world.color) or any(any(scene.materials[index].emission) for index in used)
+    if not scene.lights and not shines:
+        return ("The scene has no light: no lamp, no emission, and a black world",)
     return ()

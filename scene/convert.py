@@ -176,8 +176,6 @@ class _SceneReader:
         if not self.for_viewport:
             self._warn_of_unread_settings(scene)
         world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.warn)
-        if any(world.color):
-            self.warn("The world is shown and gives no light yet")
         return Scene(
             meshes={key: mesh for key, mesh in self.read.items() if mesh.triangle_count},
             instances=tuple(self.instances),

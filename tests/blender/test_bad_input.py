@@ -56,13 +56,23 @@ def test_camera_at_no_place_is_an_error(rebound_scene, tmp_path, value):
     assert_fails(rebound_scene, tmp_path / "a.exr", "Camera 'Camera' .* not .* finite")
 
 
-def test_no_light_warns_and_shows_emission(rebound_scene, tmp_path, capfd):
+def test_no_light_warns(rebound_scene, tmp_path, capfd):
     bpy.data.objects.remove(bpy.data.objects["Spot"])
+    rebound_scene.world = None
+    image = picture(render(rebound_scene, tmp_path / "a.exr"))
+    assert not image[..., :3].any()
+    assert "The scene has no light" in warning_lines(capfd)
+
+
+def test_emission_is_shown_and_is_a_light(rebound_scene, tmp_path, capfd):
+    bpy.data.objects.remove(bpy.data.objects["Spot"])
+    rebound_scene.world = None
     glow, _ = shader_material("Glow", "ShaderNodeEmission", Color=(0, 1, 0, 1), Strength=3.0)
     bpy.data.objects["Box"].data.materials.append(glow)
     image = picture(render(rebound_scene, tmp_path / "a.exr"))
     assert image[..., 1].max() == pytest.approx(3.0, rel=1e-3)
-    assert "The scene has no light" in warning_lines(capfd)
+    assert ((image[..., 1] > 0.0) & (image[..., 1] < 2.0)).sum() > 50, "the floor beside the box is lit"
+    assert "The scene has no light" not in warning_lines(capfd)
 
 
 def test_empty_scene_warns_and_shows_the_background(rebound_scene, tmp_path, capfd):

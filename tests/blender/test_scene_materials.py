@@ -293,9 +293,6 @@ def test_material_set_by_geometry_nodes_is_worn_by_the_instances():
 
 # World
 
-NO_WORLD_LIGHT = "The world is shown and gives no light yet"
-
-
 def world(strength=1.0, color=(0.1, 0.2, 0.3)):
     made = bpy.context.scene.world = bpy.data.worlds.new("Sky")
     if bpy.app.version < (5, 0, 0):
@@ -309,7 +306,7 @@ def world(strength=1.0, color=(0.1, 0.2, 0.3)):
 def test_world_color_times_strength():
     world(strength=3)
     scene = convert()
-    assert scene.world.color == rgb(0.3, 0.6, 0.9) and scene.warnings == (NO_WORLD_LIGHT,)
+    assert scene.world.color == rgb(0.3, 0.6, 0.9) and scene.warnings == ()
 
 
 def test_black_world_has_no_line():
@@ -328,7 +325,7 @@ def test_world_texture_is_replaced_by_the_sockets_color_with_one_line():
     made.node_tree.links.new(texture.outputs[0], made.node_tree.nodes["Background"].inputs["Color"])
     scene = convert()
     assert scene.world.color == rgb(0.2, 0.4, 0.6)
-    assert len(scene.warnings) == 2 and "'Sky'" in scene.warnings[0] and scene.warnings[1] == NO_WORLD_LIGHT
+    assert len(scene.warnings) == 1 and "'Sky'" in scene.warnings[0]
 
 
 def test_film_settings_are_read():
