@@ -86,7 +86,8 @@ def test_other_seed_is_other_noise_of_the_same_level(studio):
     view = ortho(24, 24, 3)
     one, two = (studio.render(SCENE, view, 32, ["diffuse_indirect"], seed=s)["diffuse_indirect"] for s in (0, 1))
     assert (one != two).any()
-    assert one.mean() == pytest.approx(two.mean(), rel=0.04)  # noise of the means: about 1 %
+    # All pixels share one pool, so the means have noise, too: about 3 %.
+    assert one.mean() == pytest.approx(two.mean(), rel=0.12)
 
 
 @pytest.mark.parametrize("changed", CASES, ids=str)
