@@ -293,6 +293,7 @@ def test_material_set_by_geometry_nodes_is_worn_by_the_instances():
 
 # World
 
+
 def world(strength=1.0, color=(0.1, 0.2, 0.3)):
     made = bpy.context.scene.world = bpy.data.worlds.new("Sky")
     if bpy.app.version < (5, 0, 0):

@@ -48,7 +48,8 @@ def variations():
             yield {name: int(value) if setting.kind == "INT" else value}
 
 
-CASES = [{"method": technique.id.upper(), **changed} for technique in TECHNIQUES for changed in variations()]
+SMALL = {"vpl_resolution": 64, "vpl_voxels": 64, "vpl_pool": 256}
+CASES = [{"method": technique.id.upper(), **SMALL, **changed} for technique in TECHNIQUES for changed in variations()]
 
 
 @pytest.fixture(scope="module")

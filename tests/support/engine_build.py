@@ -25,6 +25,9 @@ def fill_scene(scene) -> None:
     scene.rebound.samples = 1
     scene.rebound.shadow_resolution = 128
     scene.rebound.rsm_resolution = 32
+    scene.rebound.vpl_resolution = scene.rebound.viewport_vpl_resolution = 64
+    scene.rebound.vpl_voxels = scene.rebound.viewport_vpl_voxels = 64
+    scene.rebound.vpl_pool = scene.rebound.viewport_vpl_pool = 512
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     floor = link("Floor", mesh("Floor", QUAD), scale=(4, 4, 4))
     floor.data.materials.append(material("Red", (0.8, 0.1, 0.1)))
