@@ -131,8 +131,8 @@ SETTINGS = (
         "lobe",
         "FLOAT",
         "Least Roughness of Bounces",
-        "Glossy surfaces send light on as if they were at least this rough. Lower is truer to caustics, and noisier; "
-        "higher spreads them",
+        "Glossy surfaces send light on as if they were at least this rough. Lower is truer to caustics, at the cost of "
+        "noise; higher spreads them",
         0.25,
         minimum=0.0,
         maximum=1.0,
