@@ -18,7 +18,7 @@ from .jobs import Done, Job, do
 from .pictures import Passes, diffuse, quantity, read_passes, save_picture
 from .results import CYCLES, EEVEE, F12, REBOUND, Curve, Pass, Point, SceneResult
 from .score import scores
-from .studio import Method, Studio, methods, seconds
+from .studio import VIEWPORT, Method, Studio, methods, seconds
 from .timed_device import TimedDevice, median_passes
 
 Say = Callable[[str], None]
@@ -193,7 +193,7 @@ def steady_frame(
     The passes are taken in frames of their own: waiting for the GPU around each makes a frame longer than it is.
     """
     settings = method.settings(viewport=True)
-    studio = Studio(device, settings)
+    studio = Studio(device, settings, VIEWPORT)
     first = seconds(device, lambda: _first_picture(studio, scene, view))
     times = []
     for _ in range(frames + 1):

@@ -17,7 +17,7 @@ from rebound.scene.data import Instance, Light, LightKind, Scene, View
 
 from .results import Figure
 from .score import cells, relative_squared_error
-from .studio import Method, Studio, picture, seconds
+from .studio import VIEWPORT, Method, Studio, picture, seconds
 
 STEP = 1.0  # degrees that the camera goes around between two frames
 SHOWN = 8  # frames after which a moving picture is judged
@@ -62,7 +62,7 @@ def measure_orbit(
     ``truth`` is a path-traced picture of ``last_view``; without one the error is against our own converged one only.
     """
     pivot = _middle(scene)
-    studio = Studio(device, method.settings(viewport=True))
+    studio = Studio(device, method.settings(viewport=True), VIEWPORT)
 
     def frame(number: int) -> None:
         studio.begin(orbit_view(view, pivot, orbit(number)))

@@ -18,7 +18,7 @@ from rebound.scene.data import Instance, Light, LightKind, Material, Mesh, Scene
 
 from .curves import frame_passes
 from .results import ScalePoint, Scaling
-from .studio import Method, Studio, methods, seconds
+from .studio import VIEWPORT, Method, Studio, methods, seconds
 
 Say = Callable[[str], None]
 EVERYTHING = Visibility.CAMERA | Visibility.SHADOW | Visibility.BOUNCE
@@ -93,7 +93,7 @@ def measure_scaling(quick: bool, frames: int, say: Say = print, only: Sequence[s
 def _point(device: Device, method: Method, number: int, axis: Axis, frames: int) -> ScalePoint:
     scene, view = axis.make(number)
     settings = method.settings(viewport=True)
-    studio = Studio(device, settings)
+    studio = Studio(device, settings, VIEWPORT)
 
     def frame() -> None:
         studio.sample()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +12,14 @@ from rebound.device import Device
 from rebound.gpu_scene import GpuScene
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.passes import PASSES
-from rebound.renderer import Frame, Renderer
+from rebound.renderer import ALL_PASSES, Frame, Renderer
 from rebound.scene.changes import Changes
 from rebound.scene.data import Scene, View
 from rebound.settings import SETTINGS, Settings, Value
 
 from .pictures import KEPT_PASSES, Passes
+
+VIEWPORT = ("combined",)  # all that a viewport shows
 
 
 @dataclass(frozen=True)
@@ -56,8 +58,8 @@ def methods(*, estimators: bool = False, many_bounces: bool = False) -> list[Met
 class Studio:
     """Holds one scene and one picture of it, as a session does. Calls wait for the GPU only where they say so."""
 
-    def __init__(self, device: Device, settings: Settings) -> None:
-        self.device, self.settings = device, settings
+    def __init__(self, device: Device, settings: Settings, passes: Sequence[str] = ALL_PASSES) -> None:
+        self.device, self.settings, self._wanted = device, settings, passes
         self.gpu_scene = GpuScene(device)
         self.renderer = Renderer(device)
         self._holds: Scene | None = None
@@ -81,7 +83,7 @@ class Studio:
         else:
             if self._frame:
                 self.renderer.free_frame(self._frame)
-            self._frame = self.renderer.begin(view)
+            self._frame = self.renderer.begin(view, self._wanted)
         self._view = view
 
     def sample(self) -> None:
