@@ -150,6 +150,7 @@ def test_frame_alone_equals_the_frame_of_an_animation(rebound_scene, tmp_path):
 
 def test_warnings_are_kept_for_the_panel(rebound_scene, tmp_path):
     bpy.data.objects.remove(bpy.data.objects["Spot"])
+    rebound_scene.world = None
     render(rebound_scene, tmp_path / "a.exr")
     assert any("no light" in line for line in SESSIONS.newest.warnings)
     assert SESSIONS.newest.samples == 1 and "triangles" in SESSIONS.newest.statistics
