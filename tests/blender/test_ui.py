@@ -55,7 +55,9 @@ def draw(panel, context):
 
 
 def test_defaults_are_the_renderers(rebound_scene):
-    for name in ("samples", "shadow_resolution", "rsm_resolution"):
+    small = ("resolution", "voxels", "pool")
+    own = [f"{viewport}vpl_{name}" for viewport in ("", "viewport_") for name in small]
+    for name in ("samples", "shadow_resolution", "rsm_resolution", *own):
         rebound_scene.rebound.property_unset(name)
     for viewport in (False, True):
         found, wanted = read_settings(rebound_scene, viewport=viewport), Settings.defaults(viewport=viewport)
