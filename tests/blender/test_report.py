@@ -15,6 +15,9 @@ from PIL import Image
 
 from rebound.tests.support import browser
 
+# A minute, and the same on every backend.
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

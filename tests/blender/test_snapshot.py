@@ -13,6 +13,9 @@ from rebound.scene.data import View
 from rebound.scene.snapshot import load_snapshot, save_snapshot
 from rebound.tests.support.snapshots import assert_same
 
+# A minute, and the same on every backend.
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = Path(os.environ.get("REBOUND_SHARED", ROOT.parent / "shared")) / "scenes"
 # Seconds to minutes to read; no different in kind.
