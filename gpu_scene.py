@@ -46,6 +46,7 @@ class GpuScene:
         self.uploads: Counter[str] = Counter()
         self.draws: tuple[Draw, ...] = ()
         self.is_glossy = False  # whether anything drawn has a specular lobe
+        self.emits = False  # whether anything drawn emits
         self.matrices = np.zeros((0, 4, 4))  # float64 world_from_object of every row of the table of instances
         self.boxes = np.zeros((1, 2, 3))  # world boxes of all instances, a point at the origin for an empty scene
         self.revision = 0  # grows with every update that changes something
@@ -70,7 +71,9 @@ class GpuScene:
             self._upload_materials(scene.materials)
         if changes.geometry or self.instance_table is None or maps_before != _material_uv_maps(scene):
             self._place(scene)
-        self.is_glossy = any(scene.materials[index].is_glossy for index in {draw.material for draw in self.draws})
+        drawn = [scene.materials[index] for index in {draw.material for draw in self.draws}]
+        self.is_glossy = any(material.is_glossy for material in drawn)
+        self.emits = any(any(material.emission) for material in drawn)
         if len(changes.moved_bounds):
             self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
             del self._moved[:-REMEMBERED_MOVES]

@@ -33,7 +33,7 @@ from .index import PointIndex
 from .pool import Pool
 from .settings import SETTINGS
 from .shaders import SHADERS, VIEW_VOXELS
-from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources, emits
+from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
 from .structs import VPL_FRAME
 
 # How far a sample is after each step, for the progress bar.
@@ -129,25 +129,26 @@ class Vpl:
 
     def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
         """Whether some light's first or further bounces come from the cache."""
-        scene = inputs.gpu_scene.scene
-        return settings["bounces"] == "MANY" or emits(scene) or any(scene.world.color)
+        gpu_scene = inputs.gpu_scene
+        return settings["bounces"] == "MANY" or gpu_scene.emits or any(gpu_scene.scene.world.color)
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
         count, seed = int(settings["pool"]), inputs.noise_seed(1)
         if self._sorted != self.sources.revision:
-            self._sort_points()
+            for owner in self._indices:
+                self._sort_points(owner)
             self._sorted = self.sources.revision
         tile = self.sources.tile_of(CACHE)
         if tile is None:
             self.pool.draw(self.sources, count, MOST_WARM_UP * self._picture, seed)
             return
         many = settings["bounces"] == "MANY"
-        bounces = _bounces(inputs.gpu_scene.scene) if many else 1
         rounds, rows = 1, int(settings["cache_rows"])
-        if self._cache_revision < 0:
-            rounds, rows = bounces, POINTS_SIDE
         if self._cache_revision != inputs.gpu_scene.revision:
+            bounces = _bounces(inputs.gpu_scene.scene) if many else 1
+            if self._cache_revision < 0:
+                rounds = bounces
             self._cache_revision, self._edited = inputs.gpu_scene.revision, self._picture
             self._cache_updates = float(1 - bounces)
         if self._picture - self._edited < SETTLING:
@@ -166,17 +167,16 @@ class Vpl:
             self.cache.gather(self.sources, tile, candidates, rows, counting, inputs.gpu_scene.is_glossy)
             if self._cache_updates < COME_TO_LIGHT:
                 self.cache.emit(self.sources, tile)
-                self._sort_points()
+                self._sort_points(CACHE)
             self._cache_updates += rows / POINTS_SIDE
             yield (number + 1) / rounds
 
-    def _sort_points(self) -> None:
-        """Have the indices of surface points match the atlas."""
+    def _sort_points(self, owner: str) -> None:
+        """Have the index of one kind of surface points match the atlas."""
         assert self.voxels.grid is not None
-        for owner, index in self._indices.items():
-            tile = self.sources.tile_of(owner)
-            if tile is not None:
-                index.update(self.sources, tile, self.voxels.grid)
+        tile = self.sources.tile_of(owner)
+        if tile is not None:
+            self._indices[owner].update(self.sources, tile, self.voxels.grid)
 
     def _points(self, owner: str) -> tuple[int, int, int]:
         """Where a kind of surface points lies in the atlas: lower left texel and side, 0 where there are none."""

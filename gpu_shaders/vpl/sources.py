@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...device.interface import Device, Texture
-from ...scene.data import LightKind, Scene
+from ...scene.data import LightKind
 from ..frame.light_maps import MapTile
 from ..frame.maps import Face
 from ..frame.reflective_maps import ReflectiveShadowMaps
@@ -113,7 +113,7 @@ class Sources(ReflectiveShadowMaps):
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
         scene = gpu_scene.scene
         tiles = []
-        if emits(scene):
+        if gpu_scene.emits:
             tiles.append(MapTile(EMITTERS, -1, _NO_FACE))
         if any(scene.world.color):
             look = np.array([*scene.world.color, *_sky_sphere(gpu_scene.boxes)]).tobytes()
@@ -139,11 +139,6 @@ class Sources(ReflectiveShadowMaps):
         place = self.points_viewport(tile)
         points.update(gpu_scene, place[2])
         points.draw(gpu_scene, target, place)
-
-
-def emits(scene: Scene) -> bool:
-    """Whether any surface of the scene does."""
-    return any(any(scene.materials[m].emission) for instance in scene.instances for m in instance.materials)
 
 
 def _sky_sphere(boxes: np.ndarray) -> tuple[float, float, float, float]:
