@@ -24,21 +24,6 @@ TRACE = "voxel_trace(start, direction, 1e6)"
 FRAME = box("frame", (-1, -1, -1), (1, 1, 1))  # gives the grid its place
 
 
-@pytest.fixture
-def room(headless_device):
-    """Make rooms: freed at the end."""
-    made = []
-
-    def make(*args, **options) -> Room:
-        made.append(Room(headless_device, *args, **options))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.free()
-    assert headless_device.error == "GL_NO_ERROR"
-
-
 def unit(vectors):
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 

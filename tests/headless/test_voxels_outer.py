@@ -16,21 +16,6 @@ CUBE = box("cube", (-0.5, -0.5, 0), (0.5, 0.5, 1))
 HALVES = [5.0, 40.0, 300.0]
 
 
-@pytest.fixture
-def room(headless_device):
-    """Make rooms: freed at the end."""
-    made = []
-
-    def make(*args, **options) -> Room:
-        made.append(Room(headless_device, *args, **options))
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.free()
-    assert headless_device.error == "GL_NO_ERROR"
-
-
 def ground(half, z=0.0):
     return quad("ground", (0, 0, z), (half, 0, 0), (0, half, 0))
 
