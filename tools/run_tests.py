@@ -1,7 +1,8 @@
 """Run the test suite of one environment: `.venv/bin/python tools/run_tests.py`.
 
-Two pytest processes: one without Blender, one inside it. They never share one, because a moderngl context takes over
-Blender's. What passed is remembered for this exact source tree, so that `make test-all` does not run it again.
+Two runs of pytest: one without Blender, one inside it. They never share a process, because a moderngl context takes over
+Blender's. Each spreads its tests over a process for every core, as much of a test is one thread of Python. What passed is
+remembered for this exact source tree, so that `make test-all` does not run it again.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ SUITES = {
     "blender, slow": ["tests/blender", "-m", "slow"],
 }
 _NOTHING_COLLECTED = 5
+# A process inside Blender takes up to 4 GB; tests that share a fixture of minutes are marked as one group.
+_IN_PARALLEL = ("--numprocesses=auto", "--maxprocesses=4", "--dist=loadgroup")
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ def run(blender: str, backend: str, suite: str) -> Outcome:
     report.parent.mkdir(exist_ok=True)
     report.unlink(missing_ok=True)
     print(f"\n=== Blender {blender}, {backend}, suite {suite}", flush=True)
-    command = [venv_python(blender), "-m", "pytest", "--quiet", f"--junitxml={report}", *SUITES[suite]]
+    command = [venv_python(blender), "-m", "pytest", "--quiet", f"--junitxml={report}", *_IN_PARALLEL, *SUITES[suite]]
     tree, start = passed_before.tree_hash(), time.monotonic()
     status = subprocess.run(command, cwd=ROOT, env=os.environ | {"REBOUND_TEST_BACKEND": backend}).returncode
     outcome = _read(report, status, time.monotonic() - start)

@@ -11,8 +11,9 @@ import run_tests
 from environments import PYTHON_OF_BLENDER, usable_blenders
 from setup import set_up
 
-# What needs no GPU backend of Blender runs once a version.
 SUITES_OF_BACKEND = {"opengl": ("plain", "blender", "plain, slow", "blender, slow"), "vulkan": ("blender",)}
+# What needs no Blender runs once a Python, on the newest Blender of it.
+_NEEDS_PYTHON_ONLY = ("plain", "plain, slow")
 
 
 @dataclass
@@ -25,9 +26,15 @@ class Row:
     note: str
 
 
+def _suites(blender: str, backend: str) -> list[str]:
+    same_python = [other for other in usable_blenders() if PYTHON_OF_BLENDER[other] == PYTHON_OF_BLENDER[blender]]
+    first = same_python[0] == blender
+    return [suite for suite in SUITES_OF_BACKEND[backend] if first or suite not in _NEEDS_PYTHON_ONLY]
+
+
 def _run_backend(blender: str, backend: str) -> Row:
     total, reused = run_tests.Outcome(0, 0, 0, 0.0), []
-    for suite in SUITES_OF_BACKEND[backend]:
+    for suite in _suites(blender, backend):
         known = passed_before.recall(f"{blender}/{backend}/{suite}")
         if known:
             reused.append(suite)

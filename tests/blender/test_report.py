@@ -16,7 +16,7 @@ from PIL import Image
 from rebound.tests.support import browser
 
 # A minute, and the same on every backend.
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("report")]
 
 ROOT = Path(__file__).resolve().parents[2]
 
