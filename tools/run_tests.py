@@ -1,8 +1,8 @@
 """Run the test suite of one environment: `.venv/bin/python tools/run_tests.py`.
 
-Two runs of pytest: one without Blender, one inside it. They never share a process, because a moderngl context takes over
-Blender's. Each spreads its tests over a process for every core, as much of a test is one thread of Python. What passed is
-remembered for this exact source tree, so that `make test-all` does not run it again.
+Two runs of pytest: one without Blender, one inside it. They never share a process, because a moderngl context takes
+over Blender's. Each spreads its tests over a process for every core, as much of a test is one thread of Python. What
+passed is remembered for this exact source tree, so that `make test-all` does not run it again.
 """
 
 from __future__ import annotations

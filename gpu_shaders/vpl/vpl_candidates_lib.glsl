@@ -2,7 +2,7 @@
  * with the receiver's cosine found, chosen for its nearness alone. Each is weighted by the balance heuristic (Veach &
  * Guibas 1995) of both, so that neither touching surfaces nor small bright patches make noise, and no clamp is needed.
  *
- * Names of samplers and constants are those of `CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of vpl/structs.py. */
+ * Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of vpl/structs.py. */
 #include "frame/light_map_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
@@ -18,6 +18,9 @@ const float CANDIDATES_CELLS = 1.75;
 const float CANDIDATES_SPACING = 1.75;
 /* Cells of the cache that are asked for a hit. */
 const int CANDIDATES_ATTEMPTS = 4;
+/* Other rays that stand in for one whose hit no point of the cache answers for. */
+const int CANDIDATES_AGAIN = 2;
+const vec2 CANDIDATES_TURN = vec2(0.7548777, 0.5698403);
 /* A point of the cache answers for hits that lie so many cells off its plane. */
 const float CANDIDATES_OFF_PLANE = 0.5;
 
@@ -90,10 +93,11 @@ Vpl candidates_sky(vec3 direction)
 
 /* Radiance that the cache holds for what a ray hit after `far`: that of the point whose plane the hit lies on best, out of
  * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
- * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, light is lost
- * rather than taken from what is hidden, or it would pass walls. */
-vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise)
+ * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, it is not `known`:
+ * what is hidden is never believed, or light would pass walls. */
+vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out bool known)
 {
+  known = true;
   float edge = voxel_edge_at(hit);
   vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
   for (int attempt = 0; attempt < CANDIDATES_ATTEMPTS && vpl_frame.cache.z > 0.0; attempt++) {
@@ -122,6 +126,7 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise)
       return index_radiance(position_area_tx, flux_tx, best);
     }
   }
+  known = false;
   return vec3(0.0);
 }
 
@@ -163,6 +168,24 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
   float by_pool =
       float(vpl_frame.candidates) * candidates_probability(vpl_frame.emitter_tile, vpl_strength(flux)) / area;
   return flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
+}
+
+/* Radiance that the cache holds for a receiver's ray. Where no point answers for its hit, another ray's stands in: what is
+ * not known is taken for the mean of what the receiver sees, not for black, and still nothing passes a wall. */
+vec3 candidates_bounced(vec3 origin, vec3 N, vec3 geometric, vec2 noise, vec3 hit, vec3 direction, float far,
+                        vec3 cell_noise)
+{
+  bool known;
+  vec3 carried = candidates_carried(hit, direction, far, cell_noise, known);
+  for (int i = 1; i <= CANDIDATES_AGAIN && !known && vpl_frame.cache.z > 0.0; i++) {
+    vec3 other = candidates_cosine_direction(N, fract(noise + float(i) * CANDIDATES_TURN));
+    float other_far = dot(other, geometric) > 0.0 ? voxel_trace(origin, other, 1e30) : -1.0;
+    if (other_far >= 0.0) {
+      vec3 other_hit = origin + (other_far + 0.5 * voxel_grid.edge) * other;
+      carried = candidates_carried(other_hit, other, other_far, cell_noise, known);
+    }
+  }
+  return carried;
 }
 
 /* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. `carried` and
@@ -215,7 +238,8 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
       vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
       vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
       emitted = candidates_emitted(P, N, hit, direction);
-      carried = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 3), choice.y));
+      vec3 cell_noise = vec3(sampling_hash(pixel, seed + 3), choice.y);
+      carried = candidates_bounced(origin, N, geometric, noise, hit, direction, far, cell_noise);
       int tile = (vpl_frame.kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
         seen = candidates_seen(hit, direction, tile, seen_tile);

@@ -40,7 +40,8 @@ void main()
     out_direct = vec4(weight * index_radiance(position_area_tx, flux_tx, emitter), 1.0);
   }
   vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
-  vec3 light = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 2), choice.y));
+  bool known;
+  vec3 light = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 2), choice.y), known);
   float share;
   int tile = candidates_lamp(choice.x, share);
   if (tile >= 0) {

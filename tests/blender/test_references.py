@@ -61,18 +61,19 @@ def test_cornell_spot_all_texels_differ_by_visibility_only(render_shared):
     assert error <= 0.17
 
 
-# Many bounces are up to a tenth too dark, a third where the sky and emitters alone give light: the cache loses some.
+# Where the sky and emitters alone give light, all bounces come from the cache: its few points beside an emitter stand for
+# a wider place than they should (one bounce 6 % bright), and light beyond the warm-up is missing (many 14 % dark).
 # Scene, reference, bounces; the largest error of the energy and the largest relative squared error of what bounced.
 BOUNCES = [
     ("cornell_spot", "one_bounce", "ONE", 0.02, 0.01),
     ("divider", "one_bounce", "ONE", 0.02, 0.01),
     ("sunlit_room", "one_bounce", "ONE", 0.02, 0.05),
     ("offscreen_bounce", "one_bounce", "ONE", 0.02, 0.015),
-    ("emissive_sky", "one_bounce", "ONE", 0.06, 0.15),
-    ("cornell_spot", "multi_bounce", "MANY", 0.1, 0.02),
-    ("divider", "multi_bounce", "MANY", 0.08, 0.015),
-    ("sunlit_room", "multi_bounce", "MANY", 0.08, 0.02),
-    ("emissive_sky", "multi_bounce", "MANY", 0.35, 0.1),
+    ("emissive_sky", "one_bounce", "ONE", 0.08, 0.16),
+    ("cornell_spot", "multi_bounce", "MANY", 0.035, 0.015),
+    ("divider", "multi_bounce", "MANY", 0.03, 0.015),
+    ("sunlit_room", "multi_bounce", "MANY", 0.03, 0.02),
+    ("emissive_sky", "multi_bounce", "MANY", 0.2, 0.1),
 ]
 
 
