@@ -9,7 +9,18 @@ from importlib import import_module
 ENGINE_ID = "REBOUND"  # what a scene's render.engine says
 
 # In order of registration; unregistered in reverse. Each has register() and unregister().
-MODULES = ("log", "exit_status", "main_thread", "ui.properties", "engine", "operators", "ui.panels", "ui.compat")
+MODULES = (
+    "log",
+    "exit_status",
+    "main_thread",
+    "ui.properties",
+    "ui.versions",
+    "engine",
+    "operators",
+    "ui.quality",
+    "ui.panels",
+    "ui.compat",
+)
 
 
 def register() -> None:

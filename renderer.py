@@ -236,8 +236,9 @@ class Renderer:
         self.device.clear(frame.background_target)
 
         def each(draw: Draw) -> dict:
-            holdout = int(bool(draw.visibility & Visibility.HOLDOUT))
-            return {"pc_holdout": holdout, **material_of(inputs.gpu_scene, draw)}
+            holdout, alone = Visibility.HOLDOUT in draw.visibility, Visibility.NO_INDIRECT in draw.visibility
+            flags = {"pc_holdout": int(holdout), "pc_no_indirect": int(alone)}
+            return {**flags, **material_of(inputs.gpu_scene, draw)}
 
         draw_scene(
             self.device,

@@ -1,4 +1,7 @@
-"""The engine's settings as plain values: the renderer reads them, ui.properties makes Blender properties of them."""
+"""The engine's settings as plain values: the renderer reads them, ui.properties makes Blender properties of them.
+
+Those of lights and objects are read by the converters in ``scene``, as part of what lights and objects are.
+"""
 
 from __future__ import annotations
 
@@ -88,6 +91,90 @@ SETTINGS = (
         maximum=65535,
     ),
 )
+
+
+# light.rebound
+LIGHT_SETTINGS = (
+    Setting(
+        "use_bounce",
+        "BOOL",
+        "Bounce",
+        "Whether surfaces that this light shines on pass its light on. Off saves the time and memory of its map, at "
+        "the cost of all indirect light that it gives",
+        True,
+    ),
+    Setting(
+        "bounce_strength",
+        "FLOAT",
+        "Bounce Strength",
+        "Artistic control: factor of this light's indirect light, reflections of what it lights included. 1 is what "
+        "nature does; higher is brighter around what the light hits, lower darker, and neither keeps the balance of "
+        "direct and indirect light",
+        1.0,
+        minimum=0.0,
+        maximum=100.0,
+        unit="times the physical bounce",
+        soft_maximum=4.0,
+    ),
+    Setting(
+        "map_size",
+        "ENUM",
+        "Map Size",
+        "Width of this light's map of what it shines on, against Map Resolution of the render settings. Larger keeps "
+        "small and touching surfaces apart, at the cost of memory, as all lights' maps take more then; smaller is "
+        "quicker when things move",
+        "FULL",
+        items=(
+            Item("EIGHTH", "1:8", "An eighth of the width: for lights that hardly matter"),
+            Item("QUARTER", "1:4", "A quarter of the width"),
+            Item("HALF", "1:2", "Half the width"),
+            Item("FULL", "1:1", "As the render settings say"),
+            Item("DOUBLE", "2:1", "Twice the width"),
+            Item("QUADRUPLE", "4:1", "Four times the width: for a sun over fine detail"),
+        ),
+    ),
+)
+
+# object.rebound
+OBJECT_SETTINGS = (
+    Setting(
+        "receive_bounce",
+        "BOOL",
+        "Receive Bounce",
+        "Whether light of other surfaces and of the sky reaches this object: bounced light, glowing surfaces, the "
+        "world, reflections. Off leaves lamps and its own emission, which is quicker to compute and darker than life",
+        True,
+    ),
+)
+
+# What a .blend holds of a choice is its number. Elsewhere that is its place in the list, to which choices are added at
+# the end; these lists are put together from several, so it is their place here. Only ever add to the end.
+CHOICE_NUMBERS = {
+    "method": ("NONE", "RSM", "VPL"),
+    "show": ("PICTURE", "VPL_BOUND", "VPL_VOXELS", "VPL_HISTORY"),
+}
+
+
+def choice_number(name: str, key: str) -> int:
+    """The number that a file holds for a choice of the ENUM setting of this full name. Raises ValueError for a new
+    choice that CHOICE_NUMBERS lacks.
+    """
+    keys = CHOICE_NUMBERS.get(name) or next(tuple(i.key for i in s.items) for n, s in every_setting() if n == name)
+    return keys.index(key)
+
+
+def views_of(method: str) -> tuple[str, ...]:
+    """The choices of *Show* that mean something with this method: those of no technique, and its own."""
+    foreign = {item.key for technique in TECHNIQUES if technique.id.upper() != method for item in technique.views}
+    show = next(setting for setting in SETTINGS if setting.name == "show")
+    return tuple(item.key for item in show.items if item.key not in foreign)
+
+
+def every_setting() -> Iterator[tuple[str, Setting]]:
+    """Settings of the scene by their full names, then those of lights and of objects."""
+    yield from named_settings()
+    for setting in (*LIGHT_SETTINGS, *OBJECT_SETTINGS):
+        yield setting.name, setting
 
 
 def named_settings() -> Iterator[tuple[str, Setting]]:

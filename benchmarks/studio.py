@@ -35,7 +35,7 @@ class Method:
 
 
 def methods(*, estimators: bool = False, many_bounces: bool = False) -> list[Method]:
-    """Every technique with its default settings, the engine's default first.
+    """Every technique with one bounce and else its default settings, the engine's default first.
 
     With ``estimators`` also those that are no default; with ``many_bounces`` what can bounce more than once does so,
     too, for references that have all bounces.
@@ -43,11 +43,14 @@ def methods(*, estimators: bool = False, many_bounces: bool = False) -> list[Met
     found = []
     default = next(setting.default for setting in SETTINGS if setting.name == "method")
     for technique in sorted(TECHNIQUES, key=lambda t: t.id.upper() != default):
-        chosen = {"method": technique.id.upper()}
+        chosen: dict[str, Value] = {"method": technique.id.upper()}
+        bounces = f"{technique.id}_bounces"
+        if any(setting.name == "bounces" for setting in technique.settings):
+            chosen[bounces] = "ONE"
         found.append(Method(technique.label, dict(chosen)))
         for setting in technique.settings:
             if many_bounces and setting.name == "bounces":
-                found.append(Method(f"{technique.label}, many bounces", {**chosen, f"{technique.id}_bounces": "MANY"}))
+                found.append(Method(f"{technique.label}, many bounces", {**chosen, bounces: "MANY"}))
             others = [item for item in setting.items if item.key != setting.default]
             if estimators and setting.name == "estimator":
                 names = ({**chosen, f"{technique.id}_{setting.name}": item.key} for item in others)

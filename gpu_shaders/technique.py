@@ -33,7 +33,8 @@ class Setting:
 
     ``viewport_default`` given: the viewport has a value of its own, named ``viewport_<name>``.
     ``unit`` is what the number counts ("px", "samples", "" for a pure number); ``description`` says the trade-off
-    both ways.
+    both ways. ``panel`` is the title of the closed sub-panel that it stands in, "" for the technique's own.
+    ``soft_maximum`` is how far a slider goes; more can be typed in.
     """
 
     name: str
@@ -46,6 +47,8 @@ class Setting:
     maximum: float = 1
     unit: str = ""
     items: tuple[Item, ...] = ()
+    panel: str = ""
+    soft_maximum: float | None = None
 
 
 class Technique(Protocol):

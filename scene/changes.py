@@ -7,7 +7,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from .data import Array, Instance, Light, Scene
+from .data import Array, Instance, Light, Scene, Visibility
+
+# What of an instance's visibility light maps and voxels depend on: its shape, and the look of what it reflects.
+SHAPE_FLAGS = Visibility.SHADOW | Visibility.BOUNCE
+LOOK_FLAGS = SHAPE_FLAGS | Visibility.NO_INDIRECT
 
 
 def _no_boxes() -> Array:
@@ -89,13 +93,14 @@ def _pair_instances(old: Scene, new: Scene) -> Iterator[tuple[Instance | None, I
 def _same_instance(a: Instance | None, b: Instance | None) -> bool:
     if a is None or b is None:
         return False
-    return _same_place(a, b) and a.materials == b.materials
+    return _same_place(a, b) and a.materials == b.materials and a.visibility == b.visibility
 
 
 def _same_place(a: Instance, b: Instance) -> bool:
-    return a is b or (
-        a.mesh == b.mesh and a.visibility == b.visibility and np.array_equal(a.world_from_object, b.world_from_object)
-    )
+    if a is b:
+        return True
+    same_shape = a.mesh == b.mesh and not (a.visibility ^ b.visibility) & SHAPE_FLAGS
+    return same_shape and np.array_equal(a.world_from_object, b.world_from_object)
 
 
 def _changed_lights(old: Scene, new: Scene) -> frozenset[Hashable]:
@@ -133,7 +138,9 @@ def _moved_bounds(
 
 
 def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:
-    """True if both instances wear equal materials, whatever their places in the two material tables."""
+    """True if both take part in the same light and wear equal materials, whatever their places in the two tables."""
+    if (a.visibility ^ b.visibility) & LOOK_FLAGS:
+        return False
     if old.materials is new.materials:
         return a.materials == b.materials
     return [old.materials[i] for i in a.materials] == [new.materials[i] for i in b.materials]

@@ -13,12 +13,18 @@ from .lights import read_light
 from .materials import MaterialTable, read_world
 from .meshes import content_key, mesh_key, read_mesh
 
+# Not among them: grease pencil, which Blender itself draws over any engine's picture.
 UNSHOWN_TYPES = {
     "CURVES": "hair curves",
     "POINTCLOUD": "point clouds",
     "VOLUME": "volumes",
-    "GREASEPENCIL": "grease pencil strokes",
 }
+
+
+def _receives_bounce(obj) -> bool:
+    """Rebound's own setting of an object; all receive where there is none, as it is not enabled."""
+    own = getattr(obj, "rebound", None)
+    return own is None or bool(own.receive_bounce)
 
 
 def _here(call: Callable[[], object]) -> object:
@@ -150,6 +156,8 @@ class _SceneReader:
             flags |= flag if wanted else Visibility(0)
         if holdout and camera:
             flags |= Visibility.HOLDOUT
+        if flags and not (_receives_bounce(obj) and _receives_bounce(parent)):
+            flags |= Visibility.NO_INDIRECT
         return flags
 
     def _unique_key(self, instance, obj, parent) -> Hashable:

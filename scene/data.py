@@ -45,6 +45,7 @@ class Visibility(IntFlag):
     SHADOW = 2  # blocks light
     BOUNCE = 4  # reflects light onto others (drawn into reflective shadow maps)
     HOLDOUT = 8  # seen by the camera as a hole: alpha 0, no radiance
+    NO_INDIRECT = 16  # takes no light of other surfaces and of the sky: only lamps' direct light
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +147,8 @@ class Light:
     casts_shadow: bool = True
     diffuse_factor: float = 1.0
     specular_factor: float = 1.0
+    bounce: float = 1.0  # factor of its light once that was reflected; 0: it has no map and sends no bounce
+    map_scale: float = 1.0  # its reflective shadow map against the others: a power of 2
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from .nodes import RGB, active_output, find_input, node_tree, source, strength_a
 
 MIN_SPREAD = math.radians(1.0)  # Blender allows 0, a laser that no grid of samples would ever hit
 MAX_POWER = float(np.finfo(np.float32).max)
+MAP_SCALES = {"EIGHTH": 0.125, "QUARTER": 0.25, "HALF": 0.5, "FULL": 1.0, "DOUBLE": 2.0, "QUADRUPLE": 4.0}
 ROUND_SHAPES = {AreaShape.DISK, AreaShape.ELLIPSE}
 
 
@@ -46,8 +47,18 @@ def read_light(
         casts_shadow=bool(light.use_shadow),
         diffuse_factor=float(light.diffuse_factor) if lights["diffuse"] else 0.0,
         specular_factor=float(light.specular_factor) if lights["glossy"] else 0.0,
+        **_bounce(light),
         **shape,
     )
+
+
+def _bounce(light) -> dict[str, float]:
+    """What Rebound's own settings of a light say; without them (it is not enabled) those of a new light."""
+    own = getattr(light, "rebound", None)
+    if own is None:
+        return {}
+    strength = float(own.bounce_strength) if own.use_bounce else 0.0
+    return {"bounce": strength, "map_scale": MAP_SCALES.get(own.map_size, 1.0)}
 
 
 def light_power(light, kind: LightKind, matrix: Array, warn: Callable[[str], None]) -> tuple[float, float, float]:

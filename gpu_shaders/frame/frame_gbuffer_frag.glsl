@@ -6,7 +6,7 @@ void main()
   vec3 to_eye = pc_eye.w > 0.5 ? pc_eye.xyz - v_position : pc_eye.xyz;
   vec3 geometric = surface_geometric_normal(v_position, normalize(to_eye));
   vec3 normal = surface_shading_normal(v_normal, geometric);
-  out_position = vec4(v_position, 1.0);
+  out_position = vec4(v_position, pc_no_indirect != 0 ? -1.0 : 1.0);
   out_normal = vec4(octahedron_encode(normal), octahedron_encode(geometric));
   if (pc_holdout != 0) {
     out_albedo = vec4(0.0, 0.0, 0.0, -1.0);

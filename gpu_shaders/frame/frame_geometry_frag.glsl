@@ -12,7 +12,7 @@ void main()
     out_normal = vec4(0.0);
     return;
   }
-  float depth = -(pc_view_from_world * position).z;
+  float depth = -(pc_view_from_world * vec4(position.xyz, 1.0)).z;
   out_position_depth = vec4(position.xyz, depth);
   out_normal = vec4(octahedron_decode(texelFetch(normal_tx, pixel, 0).xy), 0.0);
 }

@@ -25,9 +25,10 @@ class GBuffer:
     """What the camera sees, one texel a pixel.
 
     ``albedo`` RGBA16F: diffuse reflectance; a: 1 surface, 0 background, -1 holdout. ``emission`` RGBA32F radiance.
-    ``position`` RGBA32F world position, w 1 where there is a surface. ``normal`` RGBA32F: shading normal and
-    geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F: specular reflectance at normal
-    incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the square root of GGX's alpha.
+    ``position`` RGBA32F world position; w: 1 surface, -1 one that takes no indirect light, 0 background. ``normal``
+    RGBA32F: shading normal and geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F:
+    specular reflectance at normal incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the
+    square root of GGX's alpha.
     Where there is no surface only ``albedo`` and ``position`` hold something: zero.
     """
 

@@ -83,14 +83,17 @@ class ReflectiveShadowMaps(LightMaps):
     def _lay_out_lights(self, gpu_scene: GpuScene, resolution: int) -> None:
         tiles: list[MapTile] = []
         rows = []
+        largest = max([1.0, *(light.map_scale for light in gpu_scene.scene.lights if light.bounce > 0.0)])
         parts = self._parts(gpu_scene)
         for index, light in enumerate(gpu_scene.scene.lights):
-            faces = light_faces(light, gpu_scene.boxes)
+            faces = light_faces(light, gpu_scene.boxes) if light.bounce > 0.0 else ()
             row = light_row(light, None, len(tiles), len(faces))
+            row["intensity"] = row["intensity"] * light.bounce
+            part = parts[index] * light.map_scale / largest
             look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
             rows.append(row)
-            tiles += [MapTile(light.key, index, face, look, parts[index]) for face in faces]
-        self.lay_out((*tiles, *self._other_tiles(gpu_scene)), resolution)
+            tiles += [MapTile(light.key, index, face, look, part) for face in faces]
+        self.lay_out((*tiles, *self._other_tiles(gpu_scene)), int(resolution * largest))
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
 
     def _parts(self, gpu_scene: GpuScene) -> Sequence[float]:

@@ -49,6 +49,7 @@ GBUFFER = Shader(
         "pc_first_instance": "INT",
         "pc_material": "INT",
         "pc_holdout": "INT",
+        "pc_no_indirect": "INT",
     },
     defines=IMAGE_DEFINES,
 )

@@ -120,8 +120,8 @@ class SurfacePoints:
     def _parts(self, gpu_scene: GpuScene) -> list[Part]:
         scene = gpu_scene.scene
         draws = visible_draws(gpu_scene, Visibility.BOUNCE)
-        if self.kind == "AREA":
-            return [_part(draw, 1.0) for draw in draws]
+        if self.kind == "AREA":  # what takes no indirect light has none to pass on
+            return [_part(draw, 1.0) for draw in draws if Visibility.NO_INDIRECT not in draw.visibility]
         self._image_means = {key: mean for key, mean in self._image_means.items() if key in scene.images}
         densities = [emission_density(m, scene, self._image_means) for m in scene.materials]
         # Against the brightest, in a single's precision: dimming all emitters alike moves no point.

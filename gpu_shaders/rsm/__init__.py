@@ -75,6 +75,7 @@ SETTINGS = (
         minimum=32,
         maximum=2048,
         unit="texels",
+        panel="Maps",
     ),
     Setting(
         "gathers",
@@ -87,6 +88,7 @@ SETTINGS = (
         minimum=1,
         maximum=4096,
         unit="texels",
+        panel="Maps",
     ),
     Setting(
         "radius",
@@ -99,6 +101,7 @@ SETTINGS = (
         minimum=0.01,
         maximum=1.5,
         unit="map widths",
+        panel="Maps",
     ),
     Setting(
         "interpolation",
@@ -141,7 +144,7 @@ class Rsm:
         target = targets.diffuse_indirect
         for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
             yield MAPS_DONE * done
-        if not inputs.gpu_scene.scene.lights:
+        if not self.maps.tiles:
             return
         if settings["interpolation"] == "OFF":
             for done in self._gather(inputs, settings, target, self._none, 1, (0, 0)):
@@ -218,13 +221,13 @@ class Rsm:
         """The same for about ``texels`` gathers a pixel."""
         published = settings["estimator"] == "DISC_PUBLISHED"
         lights = len(inputs.gpu_scene.scene.lights)
-        gathers = max(int(settings["gathers"]) // lights, LEAST_GATHERS_A_LIGHT)
+        bouncing = sum(light.bounce > 0.0 for light in inputs.gpu_scene.scene.lights)
+        gathers = max(int(settings["gathers"]) // bouncing, LEAST_GATHERS_A_LIGHT)
         shared = {
             "light_tx": self.maps.light_table,
             "rsm_face_tx": self.maps.face_table,
             "pc_gathers": gathers,
             "pc_radius": float(settings["radius"]),
-            "pc_tile": float(atlas.tile),
             "pc_seed": inputs.noise_seed(1),
             "pc_sample": inputs.sample,
         }

@@ -18,7 +18,8 @@ const float GATHER_PUBLISHED_MEAN = 1.0 / 3.0;
 struct Gather {
   vec3 P;
   vec3 N;
-  int face; /* the face that looks the receiver's way */
+  int face;   /* the face that looks the receiver's way */
+  float tile; /* texels along a side of it, as of all faces of its light */
   /* The receiver's place in it, tile coordinates; the nearest one for a receiver that the map does not hold. */
   vec2 place;
 };
@@ -48,7 +49,7 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
     vec2 xi = sampling_r2(pc_sample * pc_gathers + i, shift);
     sum += xi.x * xi.x * gather_fetch(g, g.face, gather_disc_uv(g, xi));
   }
-  float texels = MATH_PI * pc_radius * pc_radius * pc_tile * pc_tile;
+  float texels = MATH_PI * pc_radius * pc_radius * g.tile * g.tile;
   return sum * texels / (GATHER_PUBLISHED_MEAN * float(pc_gathers));
 }
 #else
@@ -75,7 +76,7 @@ vec3 gather_light(Gather g, int first_face, int face_count, vec2 shift)
     float density = share * in_disc_density + (1.0 - share) / float(face_count);
     sum += gather_fetch(g, face, uv) / density;
   }
-  return sum * pc_tile * pc_tile / float(pc_gathers);
+  return sum * g.tile * g.tile / float(pc_gathers);
 }
 #endif
 
@@ -93,8 +94,12 @@ void main()
   vec3 sum = vec3(0.0);
   for (int i = pc_first_light; i < pc_last_light; i++) {
     Light light = light_fetch(light_tx, i);
+    if (light.face_count == 0) {
+      continue;
+    }
     g.face = light_map_face(light, rsm_face_tx, g.P);
     MapFace face = map_face_fetch(rsm_face_tx, g.face);
+    g.tile = face.tile;
     vec3 p = map_position(face, g.P);
     p.z = max(p.z, face.near);
     g.place = clamp(map_uv(face, p), vec2(0.0), vec2(1.0));

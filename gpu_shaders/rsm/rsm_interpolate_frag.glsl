@@ -14,7 +14,7 @@ void main()
   out_indirect = vec4(0.0);
   out_reused = vec4(0.0);
   vec4 position = texelFetch(position_tx, pixel, 0);
-  if (position.w == 0.0) {
+  if (position.w <= 0.0) {
     return;
   }
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
@@ -38,7 +38,7 @@ void main()
       continue;
     }
     vec4 other = texelFetch(position_tx, source, 0);
-    if (other.w == 0.0) {
+    if (other.w <= 0.0) {
       continue;
     }
     vec3 other_N = octahedron_decode(texelFetch(normal_tx, source, 0).xy);

@@ -22,7 +22,7 @@ vec3 rsm_texel_light(ivec2 texel, sampler2D position_area_tx, sampler2D rsm_norm
 struct RsmReceiver {
   vec3 P;
   vec3 N;
-  bool gathers; /* false: there is no surface, or interpolation has served it already */
+  bool gathers; /* false: there is no surface that takes indirect light, or interpolation has served it already */
 };
 
 /* What `pixel` of the G-buffer shows. `reused_tx` has one texel for each pixel that is drawn, `drawn`; a texture of one
@@ -37,6 +37,6 @@ RsmReceiver rsm_receiver(ivec2 pixel, ivec2 drawn, sampler2D position_tx, sample
   bool reused = texelFetch(reused_tx, min(drawn, textureSize(reused_tx, 0) - 1), 0).r > 0.5;
   receiver.P = position.xyz;
   receiver.N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
-  receiver.gathers = position.w != 0.0 && !reused;
+  receiver.gathers = position.w > 0.0 && !reused;
   return receiver;
 }

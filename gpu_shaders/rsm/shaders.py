@@ -37,7 +37,6 @@ def _gather_disc(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
             "pc_first_gather": "INT",
             "pc_last_gather": "INT",
             "pc_radius": "FLOAT",
-            "pc_tile": "FLOAT",
             "pc_seed": "INT",
             "pc_sample": "INT",
         },

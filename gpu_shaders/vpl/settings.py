@@ -29,6 +29,7 @@ SETTINGS = (
         minimum=64,
         maximum=2048,
         unit="texels",
+        panel="Virtual Lights",
     ),
     Setting(
         "maps_at_once",
@@ -41,6 +42,7 @@ SETTINGS = (
         minimum=0,
         maximum=4096,
         unit="maps",
+        panel="Virtual Lights",
     ),
     Setting(
         "pool",
@@ -53,6 +55,7 @@ SETTINGS = (
         minimum=64,
         maximum=262144,
         unit="lights",
+        panel="Virtual Lights",
     ),
     Setting(
         "candidates",
@@ -65,13 +68,15 @@ SETTINGS = (
         minimum=1,
         maximum=1024,
         unit="lights",
+        panel="Virtual Lights",
     ),
     Setting(
         "bounces",
         "ENUM",
         "Bounces",
         "How often light is reflected before it reaches what the camera sees",
-        "ONE",
+        "MANY",
+        viewport_default="MANY",
         items=(
             Item("ONE", "1", "Light that was reflected once: quickest, and darker than life in closed rooms"),
             Item("MANY", "Many", "Light goes on until nothing is left of it, at the cost of time"),
@@ -88,6 +93,7 @@ SETTINGS = (
         minimum=1,
         maximum=64,
         unit="rows of 64 points",
+        panel="Further Bounces",
     ),
     Setting(
         "voxels",
@@ -100,6 +106,7 @@ SETTINGS = (
         minimum=64,
         maximum=1024,
         unit="voxels",
+        panel="Occlusion",
     ),
     Setting(
         "reuse",
@@ -109,6 +116,7 @@ SETTINGS = (
         "of a moving view, and light lags behind by some pictures; off knows nothing of other pictures",
         False,
         viewport_default=True,
+        panel="Reuse and Denoising",
     ),
     Setting(
         "denoise",
@@ -118,6 +126,7 @@ SETTINGS = (
         "off keeps the noise, and the finest detail",
         False,
         viewport_default=True,
+        panel="Reuse and Denoising",
     ),
     Setting(
         "bound",
@@ -126,6 +135,7 @@ SETTINGS = (
         "Take a virtual light for a disc of the size that it stands for. Off takes it for a point: contacts are a "
         "little brighter, and much noisier",
         True,
+        panel="Virtual Lights",
     ),
     Setting(
         "lobe",
@@ -137,6 +147,7 @@ SETTINGS = (
         minimum=0.0,
         maximum=1.0,
         unit="roughness",
+        panel="Reflections",
     ),
     Setting(
         "occlusion",
@@ -153,5 +164,6 @@ SETTINGS = (
                 "All of the scene, and what the camera sees closer than the voxels can tell, at the cost of some time",
             ),
         ),
+        panel="Occlusion",
     ),
 )

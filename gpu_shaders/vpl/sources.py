@@ -106,7 +106,9 @@ class Sources(ReflectiveShadowMaps):
         low, high = gpu_scene.boxes[:, 0].min(0), gpu_scene.boxes[:, 1].max(0)
         across = float(np.linalg.norm(high - low)) ** 2  # m² that a sun shines on, about
         lights = gpu_scene.scene.lights
-        power = [np.mean(light.power) * (across if light.kind is LightKind.SUN else 1.0) for light in lights]
+        power = [
+            np.mean(light.power) * light.bounce * (across if light.kind is LightKind.SUN else 1.0) for light in lights
+        ]
         strongest = max([*power, 1e-30])
         return [next((part for part, share in PARTS if p >= share * strongest), PARTS[-1][0]) for p in power]
 

@@ -9,7 +9,7 @@ void main()
   out_indirect = vec4(0.0);
   out_direct = vec4(0.0);
   vec4 position = texelFetch(position_tx, pixel, 0);
-  if (position.w == 0.0) {
+  if (position.w <= 0.0) {
     return;
   }
   vec3 P = position.xyz;

@@ -13,7 +13,7 @@ void main()
   out_direct = vec4(0.0);
   vec3 P = texelFetch(position_tx, pixel, 0).xyz;
   vec4 specular = texelFetch(specular_color_tx, pixel, 0);
-  if (texelFetch(position_tx, pixel, 0).w == 0.0 || specular.rgb == vec3(0.0)) {
+  if (texelFetch(position_tx, pixel, 0).w <= 0.0 || specular.rgb == vec3(0.0)) {
     return;
   }
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);

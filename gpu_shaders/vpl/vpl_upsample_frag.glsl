@@ -10,7 +10,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   out_light = vec4(0.0);
   vec4 position = texelFetch(position_tx, pixel, 0);
-  if (position.w == 0.0) {
+  if (position.w <= 0.0) {
     return;
   }
   vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);

@@ -61,8 +61,8 @@ def test_cornell_spot_all_texels_differ_by_visibility_only(render_shared):
     assert error <= 0.17
 
 
-# Where the sky and emitters alone give light, all bounces come from the cache: its few points beside an emitter stand for
-# a wider place than they should (one bounce 6 % bright), and light beyond the warm-up is missing (many 14 % dark).
+# Where the sky and emitters alone give light, all bounces come from the cache: its few points beside an emitter stand
+# for a wider place than they should (one bounce 6 % bright), and light beyond the warm-up is missing (many 14 % dark).
 # Scene, reference, bounces; the largest error of the energy and the largest relative squared error of what bounced.
 BOUNCES = [
     ("cornell_spot", "one_bounce", "ONE", 0.02, 0.01),

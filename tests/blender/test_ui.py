@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from rebound.session import read_settings
-from rebound.settings import Settings, named_settings
+from rebound.gpu_shaders import TECHNIQUES
+from rebound.gpu_shaders.vpl import Vpl
+from rebound.session import Status, read_settings
+from rebound.settings import SETTINGS, Settings, named_settings
 from rebound.tests.support.engine_build import rebound_scene
-from rebound.ui import compat, panels
+from rebound.ui import panels
 
 __all__ = ["rebound_scene"]
 
@@ -31,10 +33,18 @@ class Layout:
     def label(self, text="", **_options):
         self.drawn.append(text)
 
+    def menu(self, name, **_options):
+        assert hasattr(bpy.types, name)
+        self.drawn.append(name)
+
+    def prop_enum(self, data, name, value, **_options):
+        assert value in data.bl_rna.properties[name].enum_items
+        self.drawn.append(f"{name}.{value}")
+
     def column(self, **_options):
         return self
 
-    row = column
+    row = split = column
 
 
 class Context:
@@ -55,7 +65,7 @@ def draw(panel, context):
 
 
 def test_defaults_are_the_renderers(rebound_scene):
-    small = ("resolution", "voxels", "pool")
+    small = ("resolution", "voxels", "pool", "bounces")
     own = [f"{viewport}vpl_{name}" for viewport in ("", "viewport_") for name in small]
     for name in ("samples", "shadow_resolution", "rsm_resolution", *own):
         rebound_scene.rebound.property_unset(name)
@@ -97,62 +107,78 @@ def test_property_states_unit_and_holds_its_limits(rebound_scene, name, setting)
         assert all(item.description for item in entry.enum_items)
 
 
+def shown(scene, method, context="render"):
+    """What all panels of a tab draw with this method, in order."""
+    scene.rebound.method = method
+    found = []
+    for panel in panels.PANELS:
+        if panel.bl_context == context and panel.poll(Context(scene)):
+            found += draw(panel, Context(scene))
+    return found
+
+
+METHODS = [item.key for setting in SETTINGS if setting.name == "method" for item in setting.items]
+
+
 def test_every_setting_has_a_row(rebound_scene):
-    context, drawn = Context(rebound_scene), set()
-    for method in rebound_scene.rebound.bl_rna.properties["method"].enum_items:
-        rebound_scene.rebound.method = method.identifier
-        for panel in panels.CLASSES:
-            if panel.bl_context == "render":
-                drawn.update(draw(panel, context))
-    wanted = {p.identifier for p in rebound_scene.rebound.bl_rna.properties} - {"rna_type", "name"}
-    assert wanted <= drawn
+    drawn = {name for method in METHODS for name in shown(rebound_scene, method)}
+    names = {p.identifier for p in rebound_scene.rebound.bl_rna.properties} - {"rna_type", "name"}
+    assert names - {"version", "show", "viewport_show"} <= drawn
+    assert {"REBOUND_MT_show", "REBOUND_MT_viewport_show"} <= drawn
 
 
-@pytest.mark.parametrize("panel", panels.CLASSES, ids=lambda panel: panel.__name__)
+@pytest.mark.parametrize("method", METHODS)
+def test_settings_of_other_methods_are_not_shown(rebound_scene, method):
+    drawn = shown(rebound_scene, method)
+    others = {f"{t.id}_{s.name}" for t in TECHNIQUES if t.id.upper() != method for s in t.settings}
+    assert not others & set(drawn)
+    assert len(set(drawn) - {"Viewport", "Show"}) == len([name for name in drawn if name not in ("Viewport", "Show")])
+
+
+def test_first_look_is_short(rebound_scene):
+    """What is open before anybody opened anything: samples, method, its resolution and bounces; and the status."""
+    rebound_scene.rebound.method = "VPL"
+    rows = []
+    for panel in panels.PANELS:
+        if panel.bl_context == "render" and "DEFAULT_CLOSED" not in getattr(panel, "bl_options", ()):
+            rows += [name for name in draw(panel, Context(rebound_scene)) if hasattr(rebound_scene.rebound, name)]
+    assert {"samples", "method", "vpl_bounces", "viewport_vpl_bounces", "vpl_scale"} <= set(rows)
+    assert len(rows) <= 10
+
+
+def test_show_offers_views_of_the_method_only_and_keeps_others(rebound_scene):
+    group = rebound_scene.rebound
+    group.method, group.show = "VPL", "VPL_VOXELS"
+    menu = panels.REBOUND_MT_show
+    offered = draw(menu, Context(rebound_scene))
+    assert {"show.PICTURE", *(f"show.{item.key}" for item in Vpl.views)} <= set(offered)
+    group.method = "RSM"
+    offered = draw(menu, Context(rebound_scene))
+    assert "show.PICTURE" in offered and not [name for name in offered if "VPL" in name]
+    assert panels._shown(group, "show") == "Picture"
+    group.method = "VPL"
+    assert group.show == "VPL_VOXELS" and panels._shown(group, "show") == "Voxels"
+
+
+def test_memory_in_use_is_shown(rebound_scene, monkeypatch):
+    status = Status(device="A card", statistics={"gpu_bytes": 100 << 20, "shadow_maps": 3})
+    monkeypatch.setattr(panels.SESSIONS, "newest", status)
+    assert "Memory in use: 100 MB on the GPU" in draw(panels.REBOUND_PT_status, Context(rebound_scene))
+    assert "Shadow maps: 3" in draw(panels.REBOUND_PT_statistics, Context(rebound_scene))
+
+
+@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.__name__)
 def test_panel_draws_with_rebound_and_is_hidden_with_others(rebound_scene, panel):
     context = Context(rebound_scene)
+    rebound_scene.rebound.method = "RSM" if "_rsm_" in panel.__name__ else "VPL"
     draw(panel, context)
-    assert panel.poll(context)
+    assert panel.poll(context) or panel is panels.REBOUND_PT_override  # test_ui_compat.py
     context.engine = "CYCLES"
     assert not panel.poll(context)
 
 
-@pytest.mark.parametrize("panel", panels.CLASSES, ids=lambda panel: panel.__name__)
+@pytest.mark.parametrize("panel", panels.PANELS, ids=lambda panel: panel.__name__)
 def test_parent_of_a_panel_is_shown_with_rebound(rebound_scene, panel):
     parent = getattr(panel, "bl_parent_id", None)
     if parent:
         assert "REBOUND" in getattr(bpy.types, parent).COMPAT_ENGINES
-
-
-EXPECTED = (
-    "RENDER_PT_output", "RENDER_PT_format", "RENDER_PT_color_management", "DATA_PT_lens", "DATA_PT_camera",
-    "DATA_PT_EEVEE_light", "DATA_PT_spot", "EEVEE_MATERIAL_PT_surface", "EEVEE_MATERIAL_PT_context_material",
-    "EEVEE_WORLD_PT_surface", "WORLD_PT_context_world", "VIEWLAYER_PT_layer", "OBJECT_PT_visibility",
-    "DATA_PT_uv_texture", "MATERIAL_PT_preview",
-)  # fmt: skip
-UNWANTED = (
-    "RENDER_PT_eevee_raytracing", "RENDER_PT_eevee_next_raytracing", "DATA_PT_lightprobe", "DATA_PT_camera_dof",
-    "RENDER_PT_freestyle", "EEVEE_WORLD_PT_volume",
-)  # fmt: skip
-
-
-def test_blenders_own_panels_are_shown_where_they_mean_something(rebound_scene):
-    for name in EXPECTED:
-        assert "REBOUND" in getattr(bpy.types, name).COMPAT_ENGINES, name
-    for name in UNWANTED:
-        panel = getattr(bpy.types, name, None)
-        assert panel is None or "REBOUND" not in panel.COMPAT_ENGINES, name
-
-
-def test_every_name_in_the_panel_lists_exists_in_some_version(rebound_scene):
-    """A name is passed over where a version lacks it, so a typing mistake would never show."""
-    lacking = [name for name in compat.INCLUDED | compat.EXCLUDED if not hasattr(bpy.types, name)]
-    newer_or_older = {"VIEWLAYER_PT_override", "DATA_PT_falloff_curve"}
-    assert set(lacking) <= newer_or_older
-
-
-def test_unregister_hides_blenders_panels_again(rebound_scene):
-    compat.unregister()
-    shown = [p.__name__ for p in compat._all_panels() if "REBOUND" in p.COMPAT_ENGINES]
-    assert set(shown) <= {panel.__name__ for panel in panels.CLASSES}
-    compat.register()

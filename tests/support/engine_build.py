@@ -28,6 +28,7 @@ def fill_scene(scene) -> None:
     scene.rebound.vpl_resolution = scene.rebound.viewport_vpl_resolution = 64
     scene.rebound.vpl_voxels = scene.rebound.viewport_vpl_voxels = 64
     scene.rebound.vpl_pool = scene.rebound.viewport_vpl_pool = 512
+    scene.rebound.vpl_bounces = scene.rebound.viewport_vpl_bounces = "ONE"
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     floor = link("Floor", mesh("Floor", QUAD), scale=(4, 4, 4))
     floor.data.materials.append(material("Red", (0.8, 0.1, 0.1)))

@@ -16,7 +16,7 @@ from rebound.settings import Settings
 Array = np.ndarray
 EVERYTHING = Visibility.CAMERA | Visibility.SHADOW | Visibility.BOUNCE
 # Small maps and few samples: a test that needs more says so.
-QUICK = {"shadow_resolution": 256, "rsm_resolution": 64, "rsm_gathers": 32}
+QUICK = {"shadow_resolution": 256, "rsm_resolution": 64, "rsm_gathers": 32, "vpl_bounces": "ONE"}
 
 
 # --- meshes ----------------------------------------------------------------------------------------------------------

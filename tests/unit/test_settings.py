@@ -6,14 +6,17 @@ import pytest
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.gpu_shaders.frame.pixel_filter import blackman_harris, pixel_offset
 from rebound.passes import PASSES
-from rebound.settings import Settings, named_settings
+from rebound.settings import CHOICE_NUMBERS, Settings, choice_number, every_setting, named_settings, views_of
 
 NAMED = dict(named_settings())
 
 
-@pytest.mark.parametrize("name", NAMED)
+EVERY = dict(every_setting())
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_setting_describes_itself(name):
-    setting = NAMED[name]
+    setting = EVERY[name]
     assert setting.label and setting.description[0].isupper() and not setting.description.endswith(".")
     defaults = [setting.default] + ([] if setting.viewport_default is None else [setting.viewport_default])
     if setting.kind == "ENUM":
@@ -44,6 +47,31 @@ def test_names_are_distinct_and_choosable():
     methods = {item.key for item in NAMED["method"].items}
     assert methods == {"NONE", *(technique.id.upper() for technique in TECHNIQUES)}
     assert len({technique.id for technique in TECHNIQUES}) == len(TECHNIQUES)
+
+
+@pytest.mark.parametrize("name", [name for name, setting in EVERY.items() if setting.kind == "ENUM"])
+def test_choices_have_numbers_of_their_own(name):
+    """What files hold of a choice; a choice that CHOICE_NUMBERS lacks raises: add it to the end of its line there."""
+    numbers = [choice_number(name, item.key) for item in EVERY[name].items]
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_numbers_of_choices_are_those_of_every_release():
+    """Saved files hold them. Lines are added to, never changed: these are the first of each."""
+    first = {"method": ("NONE", "RSM", "VPL"), "show": ("PICTURE", "VPL_BOUND", "VPL_VOXELS", "VPL_HISTORY")}
+    for name, keys in first.items():
+        assert CHOICE_NUMBERS[name][: len(keys)] == keys
+    with pytest.raises(ValueError):
+        choice_number("method", "NO_SUCH")
+
+
+def test_views_of_a_method_are_its_own_and_those_of_none():
+    for technique in TECHNIQUES:
+        own = {item.key for item in technique.views}
+        offered = set(views_of(technique.id.upper()))
+        others = {item.key for other in TECHNIQUES if other is not technique for item in other.views}
+        assert own | {"PICTURE"} <= offered and not offered & others
+    assert "PICTURE" in views_of("NONE")
 
 
 def test_defaults_differ_between_viewport_and_final_render_as_declared():

@@ -1,0 +1,33 @@
+"""Every pixel gathers for itself: fine detail in the bounce."""
+
+import bpy
+
+rebound = bpy.context.scene.rebound
+
+rebound.samples = 128
+rebound.viewport_samples = 64
+rebound.shadow_resolution = 4096
+rebound.viewport_shadow_resolution = 2048
+rebound.soft_shadows = "SAMPLED"
+rebound.viewport_soft_shadows = "FILTERED"
+rebound.vpl_scale = "FULL"
+rebound.viewport_vpl_scale = "HALF"
+rebound.vpl_resolution = 512
+rebound.viewport_vpl_resolution = 256
+rebound.vpl_pool = 16384
+rebound.viewport_vpl_pool = 8192
+rebound.vpl_candidates = 16
+rebound.viewport_vpl_candidates = 16
+rebound.vpl_bounces = "MANY"
+rebound.viewport_vpl_bounces = "MANY"
+rebound.vpl_cache_rows = 64
+rebound.viewport_vpl_cache_rows = 8
+rebound.vpl_voxels = 512
+rebound.viewport_vpl_voxels = 256
+rebound.viewport_vpl_maps_at_once = 32
+rebound.rsm_resolution = 256
+rebound.viewport_rsm_resolution = 256
+rebound.rsm_gathers = 128
+rebound.viewport_rsm_gathers = 64
+rebound.rsm_interpolation = "OFF"
+rebound.viewport_rsm_interpolation = "HALF"
