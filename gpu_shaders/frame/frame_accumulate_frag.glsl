@@ -1,6 +1,7 @@
 /* Add one sample to the sums that are wanted. Lighting passes are kept times their colour and divided by it at the end, as
  * Cycles does, so that (direct + indirect) * colour is right on the edges too. */
 #include "lib/bxdf_lib.glsl"
+#include "lib/math_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 
 void main()
@@ -54,7 +55,7 @@ void main()
   vec4 specular = texelFetch(specular_tx, pixel, 0);
   if (albedo.a > 0.0 && specular.rgb != vec3(0.0)) {
     vec3 P = texelFetch(position_tx, pixel, 0).xyz;
-    vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - P) : pc_eye.xyz;
+    vec3 V = math_toward(P, pc_eye);
     vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
     out_glossy_color = vec4(bxdf_albedo(specular.rgb, specular.a, dot(N, V)), 0.0);
   }

@@ -1,6 +1,7 @@
 #include "frame/light_map_lib.glsl"
 #include "frame/shadow_lib.glsl"
 #include "lib/bxdf_lib.glsl"
+#include "lib/math_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 
 /* A point of the emitter of the pixel's own (sun: a direction). */
@@ -93,7 +94,7 @@ void main()
 #ifdef GLOSSY
   vec4 specular = texelFetch(specular_tx, pixel, 0);
   if (specular.rgb != vec3(0.0)) {
-    vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - position.xyz) : pc_eye.xyz;
+    vec3 V = math_toward(position.xyz, pc_eye);
     glossy = direct_mirrored(light, position.xyz, N, V, specular, own_source);
   }
 #endif

@@ -1,3 +1,9 @@
-/* Constants that several libraries need. */
+/* What several libraries need. */
 
 const float MATH_PI = 3.14159265358979;
+
+/* Unit direction from P to `place`: a point where w is 1, a direction where w is 0. */
+vec3 math_toward(vec3 P, vec4 place)
+{
+  return place.w > 0.5 ? normalize(place.xyz - P) : place.xyz;
+}

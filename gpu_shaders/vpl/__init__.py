@@ -22,32 +22,21 @@ from typing import Any
 import numpy as np
 
 from ...device.interface import Device, Target
-from ...scene.data import Scene
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.reflective_shaders import SourceKind
 from ..frame.voxels import Voxels
 from ..technique import Item, Value
-from .cache import Cache
+from .cache import MOST_WARM_UP, Cache
 from .gather import Gathering, PoolState
 from .index import PointIndex
 from .pool import Pool
 from .settings import SETTINGS
 from .shaders import SHADERS, VIEW_VOXELS
-from .sources import CACHE, EMITTERS, POINTS_SIDE, SKY_PATCHES, Sources
+from .sources import CACHE, EMITTERS, SKY_PATCHES, Sources
 from .structs import VPL_FRAME
 
 # How far a sample is after each step, for the progress bar.
 MAPS_DONE, VOXELS_DONE, CACHE_DONE = 0.2, 0.4, 0.6
-# Before a picture that follows none the cache is updated until so much of all light is left that goes on, and within
-# these limits: each update takes light a bounce further.
-LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
-# Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
-# part of them.
-NEWER = 0.5
-# Pictures after an edit in which all points of the cache gather, that old light may go at once.
-SETTLING = 4
-# Updates after which no more points come to light that had none, so that the index of them stays as it is.
-COME_TO_LIGHT = 4.0
 ALL_KINDS = sum(1 << kind for kind in SourceKind)
 FIRST_HAND = 1 << SourceKind.EMISSION | 1 << SourceKind.SKY  # light of which the cache's points send the first bounce
 
@@ -77,9 +66,6 @@ class Vpl:
         self.gathering = Gathering(device)
         self._settings: Mapping[str, Value] = {}  # of the last sample
         self._picture = 0  # number of the sample in its sequence of noise
-        self._cache_updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
-        self._edited = 0  # picture in which the scene last changed
-        self._cache_revision = -1  # of the scene that the cache last gathered in
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """See ``Technique.indirect``."""
@@ -123,7 +109,7 @@ class Vpl:
 
     def _forget(self) -> None:
         """Begin a picture that knows nothing of those before it."""
-        self._picture, self._cache_revision = 0, -1
+        self._picture = 0
         self.cache.forget()
         self.gathering.forget()
 
@@ -144,31 +130,18 @@ class Vpl:
             self.pool.draw(self.sources, count, MOST_WARM_UP * self._picture, seed)
             return
         many = settings["bounces"] == "MANY"
-        rounds, rows = 1, int(settings["cache_rows"])
-        if self._cache_revision != inputs.gpu_scene.revision:
-            bounces = _bounces(inputs.gpu_scene.scene) if many else 1
-            if self._cache_revision < 0:
-                rounds = bounces
-            self._cache_revision, self._edited = inputs.gpu_scene.revision, self._picture
-            self._cache_updates = float(1 - bounces)
-        if self._picture - self._edited < SETTLING:
-            rows = POINTS_SIDE
+        rounds, rows = self.cache.plan(inputs.gpu_scene, many=many, rows=int(settings["cache_rows"]))
+        kinds = ALL_KINDS if many else FIRST_HAND
+        self.cache.emit(self.sources, tile)
         for number in range(rounds):
-            self.cache.emit(self.sources, tile)
             update = MOST_WARM_UP * self._picture + number
             self.pool.draw(self.sources, count, update, seed)
-            candidates = self._candidates(
-                inputs,
-                settings,
-                kinds=ALL_KINDS if many else FIRST_HAND,
-                number=update,
-            )
-            counting = max(self._cache_updates, 0.0) * (NEWER if many else 1.0)
-            self.cache.gather(self.sources, tile, candidates, rows, counting, inputs.gpu_scene.is_glossy)
-            if self._cache_updates < COME_TO_LIGHT:
+            candidates = self._candidates(inputs, settings, kinds=kinds, number=update)
+            comes_to_light = self.cache.comes_to_light
+            self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy)
+            if comes_to_light:
                 self.cache.emit(self.sources, tile)
                 self._sort_points(CACHE)
-            self._cache_updates += rows / POINTS_SIDE
             yield (number + 1) / rounds
 
     def _sort_points(self, owner: str) -> None:
@@ -244,11 +217,3 @@ class Vpl:
             **self.voxels.bindings(),
             "vpl_frame": VPL_FRAME.pack([frame], for_uniform=True),
         }
-
-
-def _bounces(scene: Scene) -> int:
-    """After how many bounces light is all but gone, by the mean reflectance of what there is."""
-    used = [m for instance in scene.instances for m in instance.materials]
-    means = [float(np.mean(np.maximum(scene.materials[m].base_color, scene.materials[m].specular))) for m in used]
-    mean = min(max(float(np.mean(means)) if means else 0.0, 0.01), 0.99)
-    return int(np.clip(np.ceil(np.log(LEFT) / np.log(mean)), LEAST_WARM_UP, MOST_WARM_UP))

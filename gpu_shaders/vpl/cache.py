@@ -7,16 +7,32 @@ Each update takes light one bounce further, with the surfaces' reflectance, belo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ...device.interface import Device, Target, Texture
+from ...scene.data import Scene
 from ..frame.draws import ADD
 from ..frame.light_maps import MapTile
 from .shaders import CACHE_EMIT, CACHE_FADE, CACHE_GATHER
 from .sources import POINTS_SIDE, Sources
 
+if TYPE_CHECKING:
+    from ...gpu_scene import GpuScene
+
 # Rounds of gathering that a point does at once.
 ROUNDS = 4
+# Before a picture that follows none the cache is updated until so much of all light is left that goes on, and within
+# these limits: each update takes light a bounce further.
+LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
+# Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
+# part of them.
+NEWER = 0.5
+# Pictures after an edit in which all points gather, that old light may go at once.
+SETTLING = 4
+# Updates after which no more points come to light that had none, so that the index of them stays as it is.
+COME_TO_LIGHT = 4.0
 
 
 class Cache:
@@ -27,6 +43,27 @@ class Cache:
         self._sums: list[tuple[Texture, Target]] = []  # the newest first
         self._flux: tuple[Texture, Target] | None = None  # of the atlas
         self._next_row = 0
+        self._revision = -1  # of the scene that was last gathered in
+        self._settling = 0  # pictures to come in which all points gather
+        self._updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
+        self._counts = 1.0  # part of them that a mean is of
+
+    def plan(self, gpu_scene: GpuScene, *, many: bool, rows: int) -> tuple[int, int]:
+        """How often to gather for this picture, and in how many of the points' rows, ``rows`` if nothing changed."""
+        rounds = 1
+        if self._revision != gpu_scene.revision:
+            bounces = _bounces(gpu_scene.scene) if many else 1
+            if self._revision < 0:
+                rounds = bounces
+            self._revision, self._settling, self._updates = gpu_scene.revision, SETTLING, float(1 - bounces)
+        self._counts = NEWER if many else 1.0
+        self._settling -= 1
+        return rounds, POINTS_SIDE if self._settling >= 0 else rows
+
+    @property
+    def comes_to_light(self) -> bool:
+        """Whether the next update may give light to points that had none."""
+        return self._updates < COME_TO_LIGHT
 
     def emit(self, sources: Sources, tile: MapTile) -> None:
         """Write what every point reflects into the atlas."""
@@ -48,16 +85,16 @@ class Cache:
         )
 
     def gather(
-        self, sources: Sources, tile: MapTile, candidates: Mapping[str, Any], rows: int, updates: float, glossy: bool
+        self, sources: Sources, tile: MapTile, candidates: Mapping[str, Any], rows: int, *, glossy: bool
     ) -> None:
-        """Gather at the points of the next ``rows`` rows. ``updates``: how many of each point's count, 0 for none."""
+        """Gather at the points of the next ``rows`` rows."""
         place = sources.points_viewport(tile)
         rows = min(rows, place[3])
         if self._next_row + rows > place[3]:
             self._next_row = 0
         self._sums.reverse()
         (_, target), (old, _) = self._sums
-        most = ROUNDS * updates
+        most = ROUNDS * max(self._updates, 0.0) * self._counts
         span = (self._next_row, self._next_row + rows)
         self.device.fullscreen(CACHE_FADE, target, sum_tx=old, pc_most=most, pc_rows=span)
         self.device.fullscreen(
@@ -70,11 +107,12 @@ class Cache:
             pc_origin=place[:2],
         )
         self._next_row += rows
+        self._updates += rows / POINTS_SIDE
 
     def forget(self) -> None:
-        """Begin anew: the points are others."""
-        for _, target in self._sums:
-            self.device.clear(target)
+        """Begin anew: the points are others, or the picture follows none."""
+        self._revision = -1
+        self._clear()
 
     def free(self) -> None:
         self._free_flux()
@@ -87,9 +125,21 @@ class Cache:
         for _ in range(2):
             texture = self.device.texture((POINTS_SIDE, POINTS_SIDE), "RGBA32F")
             self._sums.append((texture, self.device.target([texture])))
-        self.forget()
+        self._clear()
+
+    def _clear(self) -> None:
+        for _, target in self._sums:
+            self.device.clear(target)
 
     def _free_flux(self) -> None:
         if self._flux is not None:
             self.device.free(self._flux[1])
             self._flux = None
+
+
+def _bounces(scene: Scene) -> int:
+    """After how many bounces light is all but gone, by the mean reflectance of what there is."""
+    used = [m for instance in scene.instances for m in instance.materials]
+    means = [float(np.mean(np.maximum(scene.materials[m].base_color, scene.materials[m].specular))) for m in used]
+    mean = min(max(float(np.mean(means)) if means else 0.0, 0.01), 0.99)
+    return int(np.clip(np.ceil(np.log(LEFT) / np.log(mean)), LEAST_WARM_UP, MOST_WARM_UP))

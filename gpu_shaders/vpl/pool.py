@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...device.interface import Device, Target, Texture
-from .shaders import LUMINANCE, POOL, POOL_ROW, REDUCE, TILE_STRENGTH, TILES
+from .shaders import BLOCK_STRENGTH, POOL, POOL_ROW, REDUCE, TILE_STRENGTH, TILES
 from .sources import TILE_STEP, Sources
 from .structs import PYRAMID_STEP
 
@@ -81,7 +81,7 @@ class Pool:
         self._allocate({**sizes, "strength": (count, 1), "sums": (count, 1)})
         self._revision = sources.revision
         fluxes, speculars = sources.colors[2:4]
-        self.device.fullscreen(LUMINANCE, self._levels["fine"][1], flux_tx=fluxes, specular_tx=speculars)
+        self.device.fullscreen(BLOCK_STRENGTH, self._levels["fine"][1], flux_tx=fluxes, specular_tx=speculars)
         for child, parent in (("fine", "middle"), ("middle", "coarse")):
             self.device.fullscreen(
                 REDUCE,

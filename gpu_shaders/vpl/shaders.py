@@ -21,9 +21,9 @@ SKY = Shader(
     defines=_DEFINES,
 )
 
-LUMINANCE = Shader(
-    name="vpl_luminance",
-    fragment="vpl/vpl_luminance_frag.glsl",
+BLOCK_STRENGTH = Shader(
+    name="vpl_block_strength",
+    fragment="vpl/vpl_block_strength_frag.glsl",
     outputs={"out_sum": "VEC4"},
     samplers={"flux_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D"},
     defines=_DEFINES,
@@ -104,33 +104,47 @@ _CANDIDATES = {
     "emitter_index_tx": "FLOAT_2D",
     **VOXEL_SAMPLERS,
 }
-_LIGHTS = (*LIGHT_DEFINES, *MAP_DEFINES)
 
 
-def _gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+def _candidate_pass(
+    name: str,
+    fragment: str,
+    outputs: tuple[str, ...],
+    samplers: tuple[str, ...],
+    constants: dict[str, str],
+    defines: tuple[tuple[str, str], ...],
+) -> Shader:
+    """A pass that includes vpl_candidates_lib.glsl."""
     return Shader(
         name=name,
-        fragment="vpl/vpl_gather_frag.glsl",
-        outputs={"out_surface": "VEC4", "out_indirect": "VEC4", "out_direct": "VEC4"},
-        samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", **_CANDIDATES},
+        fragment=fragment,
+        outputs={output: "VEC4" for output in outputs},
+        samplers={**{sampler: "FLOAT_2D" for sampler in samplers}, **_CANDIDATES},
         uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
         structs=(TILE, LIGHT, MAP_FACE),
-        constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
-        defines=(*_DEFINES, *_LIGHTS, *defines),
+        constants=constants,
+        defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES, *defines),
     )
 
 
-_GLOSSY = (("GLOSSY", "1"),)
-_REUSE = (("REUSE", "1"),)
+_COARSE = {"pc_stride": "INT", "pc_offset": "IVEC2"}
+
+
+def _gather(name: str, *defines: tuple[str, str]) -> Shader:
+    outputs, samplers = ("out_surface", "out_indirect", "out_direct"), ("position_tx", "normal_tx")
+    return _candidate_pass(name, "vpl/vpl_gather_frag.glsl", outputs, samplers, _COARSE, defines)
+
+
+_GLOSSY, _REUSE = ("GLOSSY", "1"), ("REUSE", "1")
 # By whether the result is reused, and whether anything in the scene is glossy.
 GATHER = {
-    (False, False): _gather("vpl_gather", ()),
+    (False, False): _gather("vpl_gather"),
     (False, True): _gather("vpl_gather_glossy", _GLOSSY),
     (True, False): _gather("vpl_gather_to_reuse", _REUSE),
-    (True, True): _gather("vpl_gather_to_reuse_glossy", (*_REUSE, *_GLOSSY)),
+    (True, True): _gather("vpl_gather_to_reuse_glossy", _REUSE, _GLOSSY),
 }
 
-VIEW_BOUND = _gather("vpl_view_bound", (("BOUND_VIEW", "1"),))
+VIEW_BOUND = _gather("vpl_view_bound", ("BOUND_VIEW", "1"))
 VIEW_VOXELS = Shader(
     name="vpl_view_voxels",
     fragment="vpl/vpl_view_voxels_frag.glsl",
@@ -147,19 +161,17 @@ VIEW_HISTORY = Shader(
     constants={"pc_stride": "INT", "pc_many": "FLOAT"},
 )
 
-REFLECT = Shader(
-    name="vpl_reflect",
-    fragment="vpl/vpl_reflect_frag.glsl",
-    outputs={"out_indirect": "VEC4", "out_direct": "VEC4"},
-    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "specular_color_tx": "FLOAT_2D", **_CANDIDATES},
-    uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
-    structs=(TILE, LIGHT, MAP_FACE),
-    constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
-    defines=(*_DEFINES, *_LIGHTS, *_GLOSSY),
+REFLECT = _candidate_pass(
+    "vpl_reflect",
+    "vpl/vpl_reflect_frag.glsl",
+    ("out_indirect", "out_direct"),
+    ("position_tx", "normal_tx", "specular_color_tx"),
+    _COARSE,
+    (_GLOSSY,),
 )
 
 
-def _reuse(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
+def _reuse(name: str, *defines: tuple[str, str]) -> Shader:
     return Shader(
         name=name,
         fragment="vpl/vpl_reuse_frag.glsl",
@@ -185,7 +197,7 @@ def _reuse(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
 
 
 # By whether anything in the scene is glossy.
-REUSE = {False: _reuse("vpl_reuse", ()), True: _reuse("vpl_reuse_glossy", _GLOSSY)}
+REUSE = {False: _reuse("vpl_reuse"), True: _reuse("vpl_reuse_glossy", _GLOSSY)}
 
 ATROUS = Shader(
     name="vpl_atrous",
@@ -232,20 +244,12 @@ CACHE_FADE = Shader(
 )
 
 
-def _cache_gather(name: str, defines: tuple[tuple[str, str], ...]) -> Shader:
-    return Shader(
-        name=name,
-        fragment="vpl/vpl_cache_gather_frag.glsl",
-        outputs={"out_sum": "VEC4"},
-        samplers={"position_tx": "FLOAT_2D", **_CANDIDATES},
-        uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
-        structs=(TILE, LIGHT, MAP_FACE),
-        constants={"pc_rounds": "INT", "pc_origin": "IVEC2"},
-        defines=(*_DEFINES, *_LIGHTS, *defines),
-    )
+def _cache_gather(name: str, *defines: tuple[str, str]) -> Shader:
+    constants = {"pc_rounds": "INT", "pc_origin": "IVEC2"}
+    return _candidate_pass(name, "vpl/vpl_cache_gather_frag.glsl", ("out_sum",), ("position_tx",), constants, defines)
 
 
-CACHE_GATHER = {False: _cache_gather("vpl_cache_gather", ()), True: _cache_gather("vpl_cache_gather_glossy", _GLOSSY)}
+CACHE_GATHER = {False: _cache_gather("vpl_cache_gather"), True: _cache_gather("vpl_cache_gather_glossy", _GLOSSY)}
 
 CACHE_EMIT = Shader(
     name="vpl_cache_emit",
@@ -262,7 +266,7 @@ SHADERS = (
     *CACHE_GATHER.values(),
     CACHE_EMIT,
     SKY,
-    LUMINANCE,
+    BLOCK_STRENGTH,
     REDUCE,
     TILE_STRENGTH,
     TILES,

@@ -46,18 +46,9 @@ int candidates_lamp(float u, out float share)
   if (lights <= 0.0) {
     return -1;
   }
-  int low = 0;
-  int high = vpl_frame.light_tiles - 1;
-  while (low < high) {
-    int middle = (low + high) / 2;
-    if (texelFetch(sums_tx, ivec2(middle, 0), 0).z > u * lights) {
-      high = middle;
-    } else {
-      low = middle + 1;
-    }
-  }
-  share = texelFetch(sums_tx, ivec2(low, 0), 0).w / lights;
-  return low;
+  int tile = vpl_tile_above(sums_tx, vpl_frame.light_tiles, VPL_SUM_LIGHTS, u * lights);
+  share = texelFetch(sums_tx, ivec2(tile, 0), 0).w / lights;
+  return tile;
 }
 
 /* The texel that shows what a ray along `direction` hit at `hit`, in the map of one light; id 0 where the light does not

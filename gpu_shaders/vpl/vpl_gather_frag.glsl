@@ -16,7 +16,7 @@ void main()
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
-  vec3 seen_from = reach_eye(P);
+  vec3 seen_from = math_toward(P, vpl_frame.eye);
   bool visible;
   vec3 carried;
   vec3 emitted;

@@ -51,22 +51,6 @@ const int POOL_MIDDLE_TEXELS = PYRAMID_STEP * PYRAMID_STEP;
 #define POOL_FINE(texel) texelFetch(fine_tx, texel, 0).r
 #define POOL_TEXEL(texel) vpl_texel_strength(flux_tx, specular_tx, texel)
 
-/* The tile in which `wanted` of the running sum falls. */
-int pool_tile(float wanted)
-{
-  int low = 0;
-  int high = pc_tiles - 1;
-  while (low < high) {
-    int middle = (low + high) / 2;
-    if (texelFetch(sums_tx, ivec2(middle, 0), 0).y > wanted) {
-      high = middle;
-    } else {
-      low = middle + 1;
-    }
-  }
-  return low;
-}
-
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -81,7 +65,7 @@ void main()
   }
   float u = (float(entry) + sampling_hash(ivec2(entry, 0), pool_seed()).y) / float(pc_count);
   float wanted = min(u, 0.99999994) * total;
-  int index = pool_tile(wanted);
+  int index = vpl_tile_above(sums_tx, pc_tiles, VPL_SUM_ALL, wanted);
   vec4 sums = texelFetch(sums_tx, ivec2(index, 0), 0);
   VplTile tile = vpl_tile_fetch(tile_tx, index);
   ivec2 origin = ivec2(tile.origin);

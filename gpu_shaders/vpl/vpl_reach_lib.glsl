@@ -59,9 +59,3 @@ bool reach_sees(vec3 P, vec3 geometric, vec3 seen_from, Vpl vpl)
   return voxel_clear(start, voxel_start(vpl.position, vpl.normal)) &&
          (vpl_frame.contact == 0 || reach_contact(P, vpl.position));
 }
-
-/* From P to the camera. */
-vec3 reach_eye(vec3 P)
-{
-  return vpl_frame.eye.w > 0.5 ? normalize(vpl_frame.eye.xyz - P) : vpl_frame.eye.xyz;
-}

@@ -19,7 +19,7 @@ void main()
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
-  vec3 V = reach_eye(P);
+  vec3 V = math_toward(P, vpl_frame.eye);
   int seed = vpl_frame.seed + REFLECT_SEED;
   vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed));
   vec3 direction = bxdf_sample_ggx(N, V, specular.a, noise);

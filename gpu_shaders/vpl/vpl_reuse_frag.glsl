@@ -115,7 +115,7 @@ void main()
     }
     weight = r.sum / max(able * r.target, 1e-30);
     bool own_choice = r.id == floatBitsToInt(own.x);
-    if (!own_choice && !reach_sees(at.P, at.N, reach_eye(at.P), vpl)) {
+    if (!own_choice && !reach_sees(at.P, at.N, math_toward(at.P, vpl_frame.eye), vpl)) {
       weight = 0.0;
     }
     light += vpl_light(vpl, at.P, at.N) * weight;

@@ -141,7 +141,7 @@ def test_work_of_a_sample_knows_no_lights(headless_device, monkeypatch, bounces)
     assert found[0] == found[1]
     names = [name for name, _ in found[0]]
     assert "vpl_pool" in names and any("vpl_gather" in name for name in names)
-    assert "vpl_luminance" not in names  # strengths are summed only after a map changed
+    assert "vpl_block_strength" not in names  # strengths are summed only after a map changed
 
 
 def test_power_in_one_of_many_lights_is_found(studio):
