@@ -20,6 +20,9 @@ MODULES = (
     "ui.quality",
     "ui.panels",
     "ui.compat",
+    "ui.keymap",
+    "ui.split",
+    "ui.overlay",
 )
 
 

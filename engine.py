@@ -41,23 +41,23 @@ class ReboundEngine(bpy.types.RenderEngine):
     missing_gpu = ""  # why there is no GPU in background, see _stand_down_without_gpu
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        with _boundary(self._fail):
+        with boundary(self._fail):
             register_passes(self, scene, renderlayer)
 
     def render(self, depsgraph):
-        with _boundary(self._fail):
+        with boundary(self._fail):
             if self.missing_gpu:
                 raise DeviceError(self.missing_gpu)
             render_final(self, depsgraph)
 
     def view_update(self, context, depsgraph):
-        with _boundary(self._fail_view):
+        with boundary(self._fail_view):
             self._viewport().update(context, depsgraph)
 
     def view_draw(self, context, depsgraph):
-        with _boundary(self._fail_view):
+        with boundary(self._fail_view):
             self._viewport().draw(context, depsgraph)
-        with _boundary(self._fail_view):
+        with boundary(self._fail_view):
             self._show_state(context)
 
     def _show_state(self, context) -> None:
@@ -89,7 +89,7 @@ class ReboundEngine(bpy.types.RenderEngine):
 
 
 @contextmanager
-def _boundary(fail: Callable[[str], None]) -> Iterator[None]:
+def boundary(fail: Callable[[str], None]) -> Iterator[None]:
     """Nothing gets past a callback: every error becomes one line for ``fail``, our own faults a traceback as well."""
     try:
         yield

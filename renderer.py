@@ -6,7 +6,7 @@ can show progress, keep an interface alive, and cancel between two pieces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -15,16 +15,28 @@ import numpy as np
 from .device.interface import Device, DrawState, Target, Texture
 from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
+from .gpu_shaders.frame.clock import Clock
 from .gpu_shaders.frame.direct import DirectLight
 from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
 from .gpu_shaders.frame.inputs import FrameInputs, GBuffer, LightTargets
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
 from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, SUMS, accumulate
-from .gpu_shaders.technique import Technique
+from .gpu_shaders.frame.views import (
+    LAMPS,
+    MOMENTS,
+    SHOWN,
+    UNBOUNCED,
+    VIEWS,
+    Extras,
+    draw_technique_view,
+    draw_view,
+    needed,
+)
+from .gpu_shaders.technique import DebugView, Technique
 from .passes import PASSES
 from .scene.data import View, Visibility
-from .settings import Settings
+from .settings import Settings, shown_view
 
 # How far a sample is after each step, for the progress bar: about their shares of the time.
 GBUFFER_DONE, DIRECT_DONE, INDIRECT_DONE = 0.1, 0.4, 0.95
@@ -58,6 +70,7 @@ class Frame:
     geometry_target: Target | None
     resolved: Texture
     resolved_target: Target
+    extras: Extras  # what a view or the split wants beside all that
     samples: int = 0
     follows: bool = False  # whether it was restarted, not begun
     provisional: bool = False  # whether the next sample begins anew, as the newest was made in haste
@@ -111,7 +124,8 @@ class Renderer:
         self.device = device
         self._direct = DirectLight(device)
         self._techniques: dict[str, Technique] = {}
-        self._triangles = 0
+        self._triangles = self._lights = 0
+        self.clock = Clock(device)
 
     def begin(self, view: View, passes: Sequence[str] = ALL_PASSES) -> Frame:
         """An empty frame of the view's size, of which these passes can be read.
@@ -136,30 +150,53 @@ class Renderer:
 
         Stop iterating to cancel: the frame then still is the mean of its whole samples.
         """
+        for done in self._sample(frame, gpu_scene, view, settings):
+            self.clock.pause()
+            yield done
+            self.clock.resume()
+
+    def _sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
         if frame.provisional:
             self.restart(frame)
-        inputs = _inputs(frame, gpu_scene, view, int(settings["seed"]))
-        self._triangles = gpu_scene.triangle_count
+        self.clock.begin()
+        inputs = _inputs(frame, gpu_scene, view, int(settings["seed"]), self.clock.mark)
+        self._triangles, self._lights = gpu_scene.triangle_count, len(gpu_scene.scene.lights)
+        technique = self._technique(settings)
+        shown = shown_view(settings)
+        frame.extras.keep(needed(shown, split=bool(settings["split"])))
         self._draw_gbuffer(frame, inputs)
+        self.clock.mark("surfaces")
         yield GBUFFER_DONE
         for done in self._draw_direct(frame, inputs, settings):
             yield GBUFFER_DONE + (DIRECT_DONE - GBUFFER_DONE) * done
-        technique = self._technique(settings)
-        if technique is not None:
+        self.clock.mark("direct light")
+        if LAMPS in frame.extras:
+            self._add_up(frame, inputs, {("combined",): frame.extras[LAMPS]}, DrawState(), indirect=False)
+        # A view of what a technique does is asked of one that does it.
+        bounced = technique is not None and (bool(settings["indirect"]) or shown in technique.views)
+        if technique is not None and bounced:
             self.device.clear(frame.indirect_target if frame.is_glossy else frame.light.diffuse_indirect)
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
-        frame.provisional = technique is not None and technique.provisional
-        self._accumulate(frame, inputs, indirect=technique is not None)
-        if technique is not None and any(item.key == settings["show"] for item in technique.views):
-            self._show(frame, inputs, technique, settings)
+        frame.provisional = technique is not None and bounced and technique.provisional
+        self._accumulate(frame, inputs, indirect=bounced)
+        if shown is not None:
+            self._show(frame, inputs, shown, settings, bounced)
+        self.clock.mark("sum")
+        self.clock.end()
         yield 1.0
 
     def texture(self, frame: Frame) -> Texture:
-        """RGBA32F mean of the combined pass so far, for the screen; valid until the next call."""
+        """RGBA32F mean of the picture so far, or of the view in its place; for the screen, until the next call."""
         weight = 1.0 / frame.samples if frame.samples else 0.0
-        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=frame.sums["combined"], pc_weight=weight)
+        picture = frame.extras.texture(SHOWN) or frame.sums["combined"]
+        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=picture, pc_weight=weight)
         return frame.resolved
+
+    def unbounced(self, frame: Frame) -> Texture | None:
+        """The sum over ``frame.samples`` of the picture without what the technique adds; None unless it is wanted."""
+        is_picture = frame.samples > 0 and SHOWN not in frame.extras
+        return frame.extras.texture(UNBOUNCED) if is_picture else None
 
     def read(self, frame: Frame, key: str) -> np.ndarray:
         """One pass: (h, w, channels) float32, row 0 at the bottom."""
@@ -171,7 +208,8 @@ class Renderer:
             return self.device.read(frame.geometry[0])
         if name == "normal":
             return self.device.read(frame.geometry[1])
-        return self.device.read(frame.sums[name]) / np.float32(max(frame.samples, 1))
+        shown = frame.extras.texture(SHOWN) if name == "combined" else None
+        return self.device.read(shown or frame.sums[name]) / np.float32(max(frame.samples, 1))
 
     def rsm_buffers(self, gpu_scene: GpuScene, settings: Settings) -> list[RsmBuffers]:
         """Every light's reflective shadow map, drawn for this scene."""
@@ -187,6 +225,7 @@ class Renderer:
     def statistics(self) -> Mapping[str, float]:
         """Counts for the statistics panel and the tests."""
         result: dict[str, float] = {
+            "lights": self._lights,
             "triangles": self._triangles,
             "gpu_bytes": self.device.allocated_bytes,
             "shadow_maps": len(self._direct.maps.tiles),
@@ -200,6 +239,7 @@ class Renderer:
     def free_frame(self, frame: Frame) -> None:
         for resource in frame.resources:
             self.device.free(resource)
+        frame.extras.free()
 
     def free(self) -> None:
         self._direct.free()
@@ -253,6 +293,35 @@ class Renderer:
         )
 
     def _accumulate(self, frame: Frame, inputs: FrameInputs, *, indirect: bool) -> None:
+        """Add the sample to all sums."""
+        state = ADD if frame.samples else DrawState()
+        targets = dict(frame.sum_targets)
+        if MOMENTS in frame.extras:
+            targets[MOMENTS,] = frame.extras[MOMENTS]
+        self._add_up(frame, inputs, targets, state, indirect=indirect)
+        if UNBOUNCED in frame.extras:
+            lamps = frame.extras[LAMPS].colors[0]
+            self.device.fullscreen(RESOLVE, frame.extras[UNBOUNCED], state=state, sum_tx=lamps, pc_weight=1.0)
+        if frame.samples == 0 and frame.geometry_target is not None:
+            self.device.fullscreen(
+                GEOMETRY,
+                frame.geometry_target,
+                position_tx=frame.gbuffer.position,
+                normal_tx=frame.gbuffer.normal,
+                pc_view_from_world=inputs.view.view_from_world,
+            )
+        frame.samples += 1
+
+    def _add_up(
+        self,
+        frame: Frame,
+        inputs: FrameInputs,
+        targets: Mapping[tuple[str, ...], Target],
+        state: DrawState,
+        *,
+        indirect: bool,
+    ) -> None:
+        """Draw the sample into ``targets``, by the sums in their slots."""
         gbuffer, scene = frame.gbuffer, inputs.gpu_scene.scene
         light = {name: getattr(frame.light, name).colors[0] for name in LIGHTS}
         pictures = {**light, **{name: getattr(gbuffer, name) for name in ("albedo", "emission", "position", "normal")}}
@@ -261,32 +330,31 @@ class Renderer:
         }
         given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
         given["pc_eye"] = inputs.eye
-        state = ADD if frame.samples else DrawState()
-        for sums, target in frame.sum_targets.items():
+        for sums, target in targets.items():
             shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect)
             wanted = (*shader.samplers, *shader.constants)
             resources = {name: given[name] for name in wanted}
             self.device.fullscreen(shader, target, state=state, **resources)
-        if frame.samples == 0 and frame.geometry_target is not None:
-            self.device.fullscreen(
-                GEOMETRY,
-                frame.geometry_target,
-                position_tx=gbuffer.position,
-                normal_tx=gbuffer.normal,
-                pc_view_from_world=inputs.view.view_from_world,
-            )
-        frame.samples += 1
 
-    def _show(self, frame: Frame, inputs: FrameInputs, technique: Technique, settings: Settings) -> None:
-        """Put one of the technique's views in the place of the combined pass."""
-        place = frame.light.diffuse_indirect  # whose light is in the sums already
-        technique.view(str(settings["show"]), inputs, settings.of(technique.id), place)
-        target = self.device.target([frame.sums["combined"]])
-        self.device.fullscreen(RESOLVE, target, sum_tx=place.colors[0], pc_weight=float(frame.samples))
-        self.device.free(target)
+    def _show(self, frame: Frame, inputs: FrameInputs, view: DebugView, settings: Settings, bounced: bool) -> None:
+        """Draw what is shown in the place of the picture."""
+        combined, scratch = frame.sums["combined"], frame.light.diffuse_indirect
+        if view in VIEWS:
+            if not bounced:
+                self.device.clear(scratch)  # of an earlier sample
+            draw_view(self.device, view, frame.extras, frame.gbuffer, frame.light, combined, frame.samples)
+            return
+        technique = self._technique(settings)
+        assert technique is not None
+        values, light = settings.of(technique.id), max(int(settings["show_light"]) - 1, 0)
+
+        def draw(target: Target) -> None:
+            technique.view(view.key, inputs, values, target, light)
+
+        draw_technique_view(self.device, view, frame.extras, scratch, combined, frame.samples, draw)
 
 
-def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameInputs:
+def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int, mark: Callable[[str], None]) -> FrameInputs:
     """Everything that the passes of the frame's next sample share."""
     offset = pixel_offset(frame.samples, gpu_scene.scene.filter_width)
     jitter = np.eye(4)
@@ -294,7 +362,7 @@ def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int) -> FrameIn
     clip_from_world = jitter @ view.clip_from_view @ view.view_from_world
     world_from_view = np.linalg.inv(view.view_from_world)
     eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
-    return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world, frame.follows)
+    return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world, frame.follows, mark)
 
 
 def _new_frame(device: Device, width: int, height: int, passes: Sequence[str]) -> Frame:
@@ -332,4 +400,5 @@ def _new_frame(device: Device, width: int, height: int, passes: Sequence[str]) -
         device.target(geometry) if geometry else None,
         resolved,
         device.target([resolved]),
+        Extras(device, (width, height)),
     )

@@ -16,12 +16,12 @@ import numpy as np
 
 from .device.blender import BlenderDevice
 from .gpu_scene import GpuScene
-from .gpu_shaders.frame import DISPLAY
+from .gpu_shaders.frame import DISPLAY, SPLIT
 from .renderer import Frame, Renderer, RsmBuffers
 from .scene.changes import Changes
 from .scene.convert import convert_scene
 from .scene.data import Scene, View
-from .settings import Settings, named_settings
+from .settings import VIEWPORT_SETTINGS, Settings, named_settings
 
 T = TypeVar("T")
 
@@ -35,6 +35,9 @@ class Status:
     warnings: tuple[str, ...] = ()
     statistics: Mapping[str, float] = field(default_factory=dict)
     samples: int = 0
+    seconds: Mapping[str, float] = field(default_factory=dict)  # by pass, of the newest sample, while they are timed
+    redrawn: Mapping[str, float] = field(default_factory=dict)  # what of the statistics grew since the picture began
+    region: int = 0  # address of the viewport's region, 0: no viewport
 
 
 @dataclass(eq=False)
@@ -50,6 +53,10 @@ class Picture:
     status: Status
     _pieces: Iterator[float] | None = None  # of the sample under way
     _part: float = 0.0  # how far that is, 0..1
+    _before: Mapping[str, float] = field(default_factory=dict)  # statistics when it was begun
+
+    def __post_init__(self) -> None:
+        self._before = dict(self.renderer.statistics())
 
     @property
     def samples(self) -> int:
@@ -76,7 +83,9 @@ class Picture:
             pass
         self._pieces, self._part = None, 0.0
         self.status.samples = self.samples
-        self.status.statistics = dict(self.renderer.statistics())
+        self.status.statistics = found = dict(self.renderer.statistics())
+        self.status.redrawn = {name: value - self._before.get(name, 0) for name, value in found.items()}
+        self.status.seconds = dict(self.renderer.clock.seconds)
         return True
 
     def advance(self, seconds: float) -> None:
@@ -86,9 +95,21 @@ class Picture:
             if self.piece():
                 return
 
-    def show(self) -> None:
-        """Draw the picture so far into the framebuffer that is bound now."""
-        self.device.draw_to_current(DISPLAY, image_tx=self.renderer.texture(self.frame))
+    def time_passes(self, wanted: bool) -> None:
+        """Whether every pass from the next sample on is waited for and timed."""
+        self.renderer.clock.on = wanted
+
+    def show(self, split_place: float = 0.5) -> None:
+        """Draw the picture so far into the framebuffer that is bound now.
+
+        Where the settings ask for a split, what lies left of ``split_place`` (0..1) is drawn without bounced light.
+        """
+        image, without = self.renderer.texture(self.frame), self.renderer.unbounced(self.frame)
+        if without is None:
+            self.device.draw_to_current(DISPLAY, image_tx=image)
+            return
+        weight = 1.0 / self.samples
+        self.device.draw_to_current(SPLIT, image_tx=image, without_tx=without, pc_place=split_place, pc_weight=weight)
 
     def read(self, key: str) -> np.ndarray:
         """One pass of the picture so far: (h, w, channels) float32, row 0 at the bottom."""
@@ -209,6 +230,10 @@ class Sessions:
         self.alive: weakref.WeakSet[Session] = weakref.WeakSet()
         self.newest = Status()  # of the session that rendered last, for the panel
 
+    def status_of(self, region: int) -> Status | None:
+        """That of the viewport in the region at this address, if there is one."""
+        return next((session.status for session in self.alive if session.status.region == region), None)
+
     def free_all(self) -> None:
         """Free every session, whether its engine is alive or not. To be called on the main thread."""
         for session in list(self.alive):
@@ -228,7 +253,10 @@ def read_settings(scene, *, viewport: bool) -> Settings:
         own = viewport and setting.viewport_default is not None
         return getattr(group, f"viewport_{name}" if own else name)
 
-    return Settings({name: value(name, setting) for name, setting in named_settings()})
+    values = {name: value(name, setting) for name, setting in named_settings()}
+    for setting in VIEWPORT_SETTINGS:
+        values[setting.name] = getattr(group, f"viewport_{setting.name}") if viewport else setting.default
+    return Settings(values)
 
 
 def same_view(a: View, b: View) -> bool:

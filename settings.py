@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from .gpu_shaders import TECHNIQUES
-from .gpu_shaders.technique import Item, Setting, Value
+from .gpu_shaders.frame.views import VIEWS
+from .gpu_shaders.technique import DebugView, Item, Setting, Value
 
 SETTINGS = (
     Setting(
@@ -27,13 +28,25 @@ SETTINGS = (
         "show",
         "ENUM",
         "Show",
-        "What the picture shows: itself, or what the method does",
+        "What the picture shows: itself, parts of its light, or what the method does",
         "PICTURE",
         viewport_default="PICTURE",
         items=(
             Item("PICTURE", "Picture", "The rendered picture"),
+            *VIEWS,
             *(view for technique in TECHNIQUES for view in technique.views),
         ),
+    ),
+    Setting(
+        "show_light",
+        "INT",
+        "Light",
+        "Whose map the views of light maps show, counted from 1 in the order of the scene; 0 for the active light in a "
+        "viewport, the first one in a render. Higher and lower only choose another one",
+        0,
+        minimum=0,
+        maximum=65535,
+        unit="number of a light",
     ),
     Setting(
         "samples",
@@ -89,6 +102,47 @@ SETTINGS = (
         0,
         minimum=0,
         maximum=65535,
+    ),
+)
+
+# What only a viewport has: its properties are named viewport_<name>, and a final render has the defaults.
+VIEWPORT_SETTINGS = (
+    Setting(
+        "indirect",
+        "BOOL",
+        "Indirect Light",
+        "Compute bounced light. Off shows the light of lamps alone and costs nothing; all that was found is kept, so "
+        "that it is back at once",
+        True,
+    ),
+    Setting(
+        "split",
+        "BOOL",
+        "Split",
+        "Show the picture without bounced light left of a line, and with it on the right. Drag the line; it costs one "
+        "pass and one picture's memory",
+        False,
+    ),
+)
+# The same, of how a picture is shown: changing one does not begin another.
+DISPLAY_SETTINGS = (
+    Setting(
+        "split_place",
+        "FLOAT",
+        "Split Position",
+        "Where the line of the split view stands. Higher shows more without bounced light, lower less",
+        0.5,
+        minimum=0.0,
+        maximum=1.0,
+        unit="parts of the width",
+    ),
+    Setting(
+        "stats",
+        "BOOL",
+        "Rebound Statistics",
+        "Times of all passes, and counts, as text in the viewport. To time a pass the GPU is waited for after each "
+        "one: that makes everything slower while this is on, and is not done while it is off",
+        False,
     ),
 )
 
@@ -151,7 +205,13 @@ OBJECT_SETTINGS = (
 # the end; these lists are put together from several, so it is their place here. Only ever add to the end.
 CHOICE_NUMBERS = {
     "method": ("NONE", "RSM", "VPL"),
-    "show": ("PICTURE", "VPL_BOUND", "VPL_VOXELS", "VPL_HISTORY"),
+    "show": (
+        *("PICTURE", "VPL_BOUND", "VPL_VOXELS", "VPL_HISTORY"),
+        *("DIRECT", "INDIRECT", "IRRADIANCE", "ALBEDO", "NORMALS", "VARIANCE"),
+        *("VPL_OCCLUSION", "VPL_RESOLUTION", "VPL_POOL"),
+        *("VPL_MAPS", "VPL_MAP_DEPTH", "VPL_MAP_POSITION", "VPL_MAP_NORMAL", "VPL_MAP_FLUX"),
+        *("RSM_RESOLUTION", "RSM_MAPS", "RSM_MAP_DEPTH", "RSM_MAP_POSITION", "RSM_MAP_NORMAL", "RSM_MAP_FLUX"),
+    ),
 }
 
 
@@ -199,6 +259,7 @@ class Settings:
             name: s.viewport_default if viewport and s.viewport_default is not None else s.default
             for name, s in named_settings()
         }
+        values |= {setting.name: setting.default for setting in VIEWPORT_SETTINGS}
         unknown = changed.keys() - values.keys()
         if unknown:
             raise KeyError(f"no such setting: {', '.join(sorted(unknown))}")
@@ -211,3 +272,9 @@ class Settings:
         """One technique's values by their short names."""
         prefix = f"{technique}_"
         return {name.removeprefix(prefix): value for name, value in self.values.items() if name.startswith(prefix)}
+
+
+def shown_view(settings: Settings) -> DebugView | None:
+    """What is shown in the place of the picture; None for the picture, and for a view of another method."""
+    views = [*VIEWS, *(v for kind in TECHNIQUES if kind.id == str(settings["method"]).lower() for v in kind.views)]
+    return next((view for view in views if view.key == settings["show"]), None)

@@ -9,6 +9,7 @@ import gpu
 from mathutils import Matrix
 
 from .scene.cameras import region_view
+from .scene.data import Scene
 from .session import SESSIONS, Session, read_settings
 from .settings import Settings
 
@@ -41,15 +42,17 @@ class Viewport:
     def draw(self, context, depsgraph) -> None:
         """Work on the picture for a bounded time and draw it."""
         view = region_view(context.region, context.region_data)
-        settings = read_settings(depsgraph.scene, viewport=True)
+        settings = _of_active_light(read_settings(depsgraph.scene, viewport=True), self.session.scene, depsgraph)
         attempt = (settings, view.width, view.height)
         if not self._synced or attempt == self._failed_for:
             return
         self._failed_for = attempt  # until it went well
+        self.session.status.region = context.region.as_pointer()
         picture, wanted = self.session.picture(view, settings, SHOWN), int(settings["samples"])
+        picture.time_passes(depsgraph.scene.rebound.viewport_stats)
         if picture.lacks(wanted):
             picture.advance(SECONDS_PER_DRAW)
-        picture.show()
+        picture.show(depsgraph.scene.rebound.viewport_split_place)
         self._failed_for, self.error = None, ""
         self.unfinished = picture.lacks(wanted)
         self.progress = f"Sample {picture.samples}/{wanted}"
@@ -75,6 +78,16 @@ class Viewport:
                 left = (region.width - blf.dimensions(0, line)[0]) / 2
                 blf.position(0, left, region.height / 2 - number * 1.5 * TEXT_SIZE, 0)
                 blf.draw(0, line)
+
+
+def _of_active_light(settings: Settings, scene: Scene, depsgraph) -> Settings:
+    """The settings with the active light's number in the place of 0, where a view asks whose maps it is to show."""
+    if settings["show_light"] or "_MAP" not in str(settings["show"]):
+        return settings
+    active = depsgraph.view_layer.objects.active
+    names = [light.name for light in scene.lights]
+    number = names.index(active.name) + 1 if active is not None and active.name in names else 0
+    return Settings({**settings.values, "show_light": number})
 
 
 def _pixel_space(width: int, height: int) -> Matrix:

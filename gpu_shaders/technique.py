@@ -28,6 +28,18 @@ class Item:
 
 
 @dataclass(frozen=True)
+class DebugView(Item):
+    """A picture of what goes on, in place of the rendered one. ``description`` says what its colours mean.
+
+    ``averaged``: the mean over the samples is shown, else what the newest one gave. ``over_picture``: it is drawn over
+    the rendered picture, and covers parts of it.
+    """
+
+    averaged: bool = False
+    over_picture: bool = False
+
+
+@dataclass(frozen=True)
 class Setting:
     """One user-visible value. ``ui.properties`` makes a Blender property from it, the tests check its limits.
 
@@ -63,7 +75,7 @@ class Technique(Protocol):
     description: str
     settings: tuple[Setting, ...]
     shaders: tuple[Shader, ...]
-    views: tuple[Item, ...]  # pictures of what the technique does, in place of the rendered one; keys "<ID>_<NAME>"
+    views: tuple[DebugView, ...]  # pictures of what the technique does; keys "<ID>_<NAME>"
 
     def __init__(self, device: Device) -> None: ...
 
@@ -82,8 +94,14 @@ class Technique(Protocol):
         """
         ...
 
-    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
-        """Draw one of ``views`` over ``target`` (RGBA32F, of the picture's size), after ``indirect``."""
+    def view(
+        self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target, light: int = 0
+    ) -> None:
+        """Draw one of ``views`` into ``target``, after ``indirect``, and leave no trace of that in later samples.
+
+        ``target`` is RGBA32F, of the picture's size: black, or for a view over the picture what was rendered so far.
+        ``light``: index of the one that is asked about, where a view is of one light.
+        """
         ...
 
     def statistics(self) -> Mapping[str, float]:

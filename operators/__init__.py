@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 
 from .save_rsm_buffers import REBOUND_OT_save_rsm_buffers
+from .toggle_indirect import REBOUND_OT_toggle_indirect
 
-CLASSES = (REBOUND_OT_save_rsm_buffers,)
+CLASSES = (REBOUND_OT_save_rsm_buffers, REBOUND_OT_toggle_indirect)
 
 
 def register() -> None:

@@ -10,7 +10,7 @@ from ..gpu_shaders import TECHNIQUES
 from ..gpu_shaders.technique import Setting, Technique
 from ..passes import PASSES
 from ..session import SESSIONS
-from ..settings import named_settings, views_of
+from ..settings import DISPLAY_SETTINGS, VIEWPORT_SETTINGS, named_settings, views_of
 from .quality import REBOUND_PT_presets
 from .versions import file_notes
 
@@ -205,11 +205,17 @@ class REBOUND_PT_debug(ReboundPanel, bpy.types.Panel):
             label = split.row()
             label.alignment = "RIGHT"
             label.label(text=text)
-            split.menu(f"REBOUND_MT_{name}", text=_shown(group, name))
+            split.menu(f"REBOUND_MT_{name}", text=shown_label(group, name))
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(group, "show_light")
+        column = layout.column(align=True, heading="Viewport")
+        for setting in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS):
+            column.prop(group, f"viewport_{setting.name}")
         self.layout.operator("rebound.save_rsm_buffers")
 
 
-def _shown(group, name: str) -> str:
+def shown_label(group, name: str) -> str:
     """The label of what is shown: another method's view shows the picture."""
     key = getattr(group, name)
     key = key if key in views_of(group.method) else "PICTURE"

@@ -9,7 +9,14 @@ from collections.abc import Iterable
 import bpy
 
 from ..gpu_shaders.technique import Setting, Value
-from ..settings import LIGHT_SETTINGS, OBJECT_SETTINGS, choice_number, named_settings
+from ..settings import (
+    DISPLAY_SETTINGS,
+    LIGHT_SETTINGS,
+    OBJECT_SETTINGS,
+    VIEWPORT_SETTINGS,
+    choice_number,
+    named_settings,
+)
 from .versions import VERSION
 
 
@@ -69,6 +76,7 @@ ReboundSceneSettings.__annotations__ = {
         options={"HIDDEN"},
     ),
     **_annotations(named_settings()),
+    **{f"viewport_{s.name}": _property(s.name, s, s.default, s.label) for s in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS)},
 }
 ReboundLightSettings.__annotations__ = _annotations((s.name, s) for s in LIGHT_SETTINGS)
 ReboundObjectSettings.__annotations__ = _annotations((s.name, s) for s in OBJECT_SETTINGS)

@@ -25,8 +25,13 @@ void main()
 #endif
   vec3 environment = background ? pc_background.rgb : vec3(0.0);
   float alpha = background ? pc_background.a : max(albedo.a, 0.0);
+  vec3 combined = direct + indirect + glossy_direct + glossy_indirect + emission + environment;
 #ifdef WANT_COMBINED
-  out_combined = vec4(direct + indirect + glossy_direct + glossy_indirect + emission + environment, alpha);
+  out_combined = vec4(combined, alpha);
+#endif
+#ifdef WANT_MOMENTS
+  float luminance = dot(combined, vec3(0.2126, 0.7152, 0.0722));
+  out_moments = vec4(luminance, luminance * luminance, 0.0, 0.0);
 #endif
 #ifdef WANT_DIFFUSE_DIRECT
   out_diffuse_direct = vec4(direct, 0.0);

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,6 +58,10 @@ class LightTargets:
     glossy_indirect: Target
 
 
+def _unmarked(_name: str) -> None:
+    """Nothing is timed."""
+
+
 @dataclass(frozen=True, eq=False)
 class FrameInputs:
     """One sample of one frame. ``seed`` is the frame's, the same for all of its samples.
@@ -65,7 +69,7 @@ class FrameInputs:
     ``eye`` is the camera's position and 1, or for an orthographic view the unit direction to it and 0.
     ``follows``: the picture follows another of the same frame, as in a viewport that moves; what was found for that may
     be used again. ``clip_from_world``, (4, 4) float64, has this sample's offset inside the pixel in it: the G-buffer
-    was drawn by it.
+    was drawn by it. ``mark``: to be called with a pass's name when it was done, for ``clock.Clock``.
     """
 
     gpu_scene: GpuScene
@@ -76,6 +80,7 @@ class FrameInputs:
     eye: tuple[float, float, float, float]
     clip_from_world: np.ndarray
     follows: bool = False
+    mark: Callable[[str], None] = _unmarked
 
     def noise_seed(self, stream: int) -> int:
         """A seed for sampling_hash(), the same for all samples: they walk along one sequence in every pixel, which

@@ -121,7 +121,10 @@ DIRECT = {
 
 
 def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool) -> Shader:
-    """Add a sample to up to six ``sums`` of SUMS. Without ``glossy`` or ``indirect`` that light is taken for none."""
+    """Add a sample to up to six ``sums``: of SUMS, or "moments" (luminance, its square).
+
+    Without ``glossy`` or ``indirect`` that light is taken for none.
+    """
     light = ["diffuse_direct", *(["diffuse_indirect"] if indirect else [])]
     light += ["glossy_direct", *(["glossy_indirect"] if indirect else [])] if glossy else []
     albedo = glossy and "glossy_color" in sums
@@ -161,9 +164,19 @@ DISPLAY = Shader(
     samplers={"image_tx": "FLOAT_2D"},
 )
 
-# The accumulations of a viewport, and of a final render with all passes.
-_ACCUMULATE = tuple(
-    accumulate(sums, glossy=lit, indirect=lit) for sums in (SUMS[:1], SUMS[:6], SUMS[6:]) for lit in (False, True)
+SPLIT = Shader(
+    name="frame_split",
+    fragment="frame/frame_split_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers={"image_tx": "FLOAT_2D", "without_tx": "FLOAT_2D"},
+    constants={"pc_place": "FLOAT", "pc_weight": "FLOAT"},
 )
 
-SHADERS = (GBUFFER, SHADOW, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY)
+# The accumulations of a viewport, and of a final render with all passes.
+_ACCUMULATE = tuple(
+    accumulate(sums, glossy=lit, indirect=lit)
+    for sums in (SUMS[:1], SUMS[:6], SUMS[6:], ("moments",))
+    for lit in (False, True)
+)
+
+SHADERS = (GBUFFER, SHADOW, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)

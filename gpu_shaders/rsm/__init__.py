@@ -22,10 +22,11 @@ from ...device.shader import Shader
 from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
+from ..frame.map_views import draw_maps, map_views
 from ..frame.maps import Atlas
 from ..frame.reflective_maps import ReflectiveShadowMaps
-from ..technique import Item, Setting, Value
-from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SHADERS
+from ..technique import DebugView, Item, Setting, Value
+from .shaders import GATHER_ALL, GATHER_EXACT, GATHER_PUBLISHED, INTERPOLATE, SHADERS, VIEW_RESOLUTION
 
 # Texel lookups in one pass: about half a second on one or two CPU cores, some milliseconds on a GPU.
 WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
@@ -119,6 +120,14 @@ SETTINGS = (
         ),
     ),
 )
+VIEWS = (
+    DebugView(
+        "RSM_RESOLUTION",
+        "Bounce Resolution",
+        "Red: pixels that gathered for themselves. Green: those that took their bounced light from pixels around them",
+    ),
+    *map_views("RSM"),
+)
 
 
 class Rsm:
@@ -129,7 +138,7 @@ class Rsm:
     description = "One diffuse bounce from what each light sees; off-screen light included, no occlusion of the bounce"
     settings = SETTINGS
     shaders = SHADERS
-    views = ()
+    views = VIEWS
     provisional = False
 
     def __init__(self, device: Device) -> None:
@@ -144,11 +153,13 @@ class Rsm:
         target = targets.diffuse_indirect
         for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
             yield MAPS_DONE * done
+        inputs.mark("light maps")
         if not self.maps.tiles:
             return
         if settings["interpolation"] == "OFF":
             for done in self._gather(inputs, settings, target, self._none, 1, (0, 0)):
                 yield MAPS_DONE + (1.0 - MAPS_DONE) * done
+            inputs.mark("gather")
             return
         stride = STRIDES[str(settings["interpolation"])]
         offset = grid_offset(inputs.seed, inputs.sample, stride)
@@ -159,18 +170,34 @@ class Rsm:
         reused = self._interpolate(inputs, coarse, target, stride, offset)
         for done in self._gather(inputs, settings, target, reused, 1, (0, 0)):
             yield COARSE_DONE + (1.0 - COARSE_DONE) * done
+        inputs.mark("gather")
 
-    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
-        raise KeyError(key)
+    def view(
+        self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target, light: int = 0
+    ) -> None:
+        """See ``Technique.view``."""
+        if not inputs.gpu_scene.scene.lights:
+            return
+        if key == "RSM_RESOLUTION":
+            interpolates = settings["interpolation"] != "OFF" and self._reuse is not None
+            self.device.fullscreen(
+                VIEW_RESOLUTION,
+                target,
+                position_tx=inputs.gbuffer.position,
+                reused_tx=self._reuse[0] if interpolates and self._reuse else self._none,
+                pc_interpolates=int(interpolates),
+            )
+            return
+        draw_maps(self.device, key, self.maps, inputs.gpu_scene, light, target)
 
     def statistics(self) -> Mapping[str, float]:
         atlas = self.maps.atlas
         tile = atlas.tile if atlas else 0
         return {
-            "rsm_maps": len(self.maps.tiles),
-            "rsm_maps_drawn": self.maps.drawn,
-            "rsm_resolution": tile,
-            "vpls": len(self.maps.tiles) * tile * tile,
+            "light_maps": len(self.maps.tiles),
+            "light_maps_drawn": self.maps.drawn,
+            "light_map_resolution": tile,
+            "light_texels": len(self.maps.tiles) * tile * tile,
         }
 
     def free(self) -> None:

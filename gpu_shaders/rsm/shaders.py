@@ -55,4 +55,12 @@ INTERPOLATE = Shader(
     constants=_GRID,
 )
 
-SHADERS = (GATHER_ALL, GATHER_PUBLISHED, GATHER_EXACT, INTERPOLATE)
+VIEW_RESOLUTION = Shader(
+    name="rsm_view_resolution",
+    fragment="rsm/rsm_view_resolution_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers={"position_tx": "FLOAT_2D", "reused_tx": "FLOAT_2D"},
+    constants={"pc_interpolates": "INT"},
+)
+
+SHADERS = (GATHER_ALL, GATHER_PUBLISHED, GATHER_EXACT, INTERPOLATE, VIEW_RESOLUTION)

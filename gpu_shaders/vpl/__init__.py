@@ -23,17 +23,19 @@ import numpy as np
 
 from ...device.interface import Device, Target
 from ..frame.inputs import FrameInputs, LightTargets
+from ..frame.map_views import draw_maps
 from ..frame.reflective_shaders import SourceKind
 from ..frame.voxels import Voxels
-from ..technique import Item, Value
+from ..technique import Value
 from .cache import MOST_WARM_UP, Cache
 from .gather import Gathering, PoolState
 from .index import PointIndex
 from .pool import Pool
 from .settings import SETTINGS
-from .shaders import SHADERS, VIEW_VOXELS
+from .shaders import SHADERS
 from .sources import CACHE, EMITTERS, SKY_PATCHES, Sources
 from .structs import VPL_FRAME
+from .views import VIEWS, view_occlusion, view_pool, view_voxels
 
 # How far a sample is after each step, for the progress bar.
 MAPS_DONE, VOXELS_DONE, CACHE_DONE = 0.2, 0.4, 0.6
@@ -49,11 +51,7 @@ class Vpl:
     description = "Bounced light of all lights, emissive surfaces and the sky, with occlusion, from one resampled pool"
     settings = SETTINGS
     shaders = SHADERS
-    views = (
-        Item("VPL_BOUND", "Bound", "Light that is lost because virtual lights are discs, not points"),
-        Item("VPL_VOXELS", "Voxels", "The voxels that block bounced light, as the camera sees them"),
-        Item("VPL_HISTORY", "History", "From red to green: how many samples the light of a pixel is the mean of"),
-    )
+    views = VIEWS
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -78,12 +76,15 @@ class Vpl:
         with_cache, most = self._wants_cache(inputs, settings), int(settings["maps_at_once"]) if inputs.follows else 0
         for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache, most):
             yield MAPS_DONE * done
+        inputs.mark("light maps")
         if not self.sources.tiles:
             return
         for done in self.voxels.update(gpu_scene, int(settings["voxels"])):
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done
+        inputs.mark("voxels")
         for done in self._fill_pool(inputs, settings):
             yield VOXELS_DONE + (CACHE_DONE - VOXELS_DONE) * done
+        inputs.mark("virtual lights")
         candidates = self._candidates(inputs, settings, kinds=ALL_KINDS, number=self._picture)
         about = PoolState(self._picture, self.sources.revision)
         for done in self.gathering.draw(inputs, settings, candidates, about, targets):
@@ -94,18 +95,27 @@ class Vpl:
         """See ``Technique.provisional``."""
         return self.sources.pending > 0
 
-    def view(self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target) -> None:
+    def view(
+        self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target, light: int = 0
+    ) -> None:
         """See ``Technique.view``."""
         if not self.sources.tiles:
-            self.device.clear(target)
-        elif key == "VPL_HISTORY":
+            return
+        if key == "VPL_HISTORY":
             self.gathering.view_history(settings, target)
+        elif key == "VPL_RESOLUTION":
+            self.gathering.view_resolution(inputs, target)
         elif key == "VPL_BOUND":
             candidates = self._candidates(inputs, settings, kinds=ALL_KINDS, number=self._picture)
-            self.gathering.view_bound(inputs, settings, candidates, target)
+            self.gathering.view_bound(inputs, candidates, target)
+        elif key == "VPL_VOXELS":
+            view_voxels(self.device, self.voxels, inputs, target)
+        elif key == "VPL_OCCLUSION":
+            view_occlusion(self.device, self.voxels, inputs, target)
+        elif key == "VPL_POOL":
+            view_pool(self.device, self.pool, int(settings["pool"]), len(self.sources.tiles), inputs, target)
         else:
-            world_from_clip = np.linalg.inv(inputs.clip_from_world)
-            self.device.fullscreen(VIEW_VOXELS, target, **self.voxels.bindings(), pc_world_from_clip=world_from_clip)
+            draw_maps(self.device, key, self.sources, inputs.gpu_scene, light, target)
 
     def _forget(self) -> None:
         """Begin a picture that knows nothing of those before it."""
@@ -159,11 +169,12 @@ class Vpl:
     def statistics(self) -> Mapping[str, float]:
         atlas = self.sources.atlas
         return {
-            "rsm_maps": self.sources.light_tiles,
-            "rsm_maps_drawn": self.sources.drawn,
-            "rsm_maps_pending": self.sources.pending,
-            "rsm_resolution": atlas.tile if atlas else 0,
-            "vpls": len(self.sources.tiles) * atlas.tile**2 if atlas else 0,
+            "light_maps": self.sources.light_tiles,
+            "light_maps_drawn": self.sources.drawn,
+            "light_maps_pending": self.sources.pending,
+            "light_map_resolution": atlas.tile if atlas else 0,
+            "virtual_lights": int(self._settings["pool"]) if self.sources.tiles else 0,
+            "light_texels": len(self.sources.tiles) * atlas.tile**2 if atlas else 0,
         }
 
     def free(self) -> None:

@@ -14,7 +14,17 @@ from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
-from .shaders import ATLAS_SAMPLERS, ATROUS, GATHER, REFLECT, REUSE, UPSAMPLE, VIEW_BOUND, VIEW_HISTORY
+from .shaders import (
+    ATLAS_SAMPLERS,
+    ATROUS,
+    GATHER,
+    REFLECT,
+    REUSE,
+    UPSAMPLE,
+    VIEW_BOUND,
+    VIEW_HISTORY,
+    VIEW_RESOLUTION,
+)
 from .structs import OLD_VIEW
 
 # Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
@@ -104,6 +114,7 @@ class Gathering:
         self.device = device
         self._grid: _Grid | None = None
         self._before: _Before | None = None
+        self._drawn: _Before | None = None  # the newest picture, reused or not
         self._settling = 0  # samples to come whose mean stays short
 
     def draw(
@@ -135,32 +146,48 @@ class Gathering:
         if reuses:
             self._reuse(inputs, grid, candidates, now)
             light = self._filtered(grid) if settings["denoise"] else grid.noisy[0]
-            self._upsample(inputs, now, grid, light, targets.diffuse_indirect)
+            self._upsample(inputs, now, grid.surfaces[0], light, targets.diffuse_indirect)
         else:
             for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
-                self._upsample(inputs, now, grid, light, target)
+                self._upsample(inputs, now, grid.surfaces[0], light, target)
+        inputs.mark("gather")
         if inputs.gpu_scene.is_glossy:
             yield FILTER_DONE
             self._reflect(inputs, settings, candidates, grid, now, targets)
-        self._before = now if reuses else None
+            inputs.mark("reflect")
+        self._before, self._drawn = now if reuses else None, now
 
-    def view_bound(
-        self, inputs: FrameInputs, settings: Mapping[str, Value], candidates: Mapping[str, Any], target: Target
-    ) -> None:
+    def view_bound(self, inputs: FrameInputs, candidates: Mapping[str, Any], target: Target) -> None:
         """Draw the light that the bound takes away, as this sample found it."""
-        stride = STRIDES[str(settings["scale"])]
-        assert self._grid is not None
-        grid, now = self._grid, self._now(inputs, stride, (0, 0), -1)
+        assert self._drawn is not None
+        now, size = self._drawn, grid_size(inputs.view, self._drawn.stride)
+        # Of its own: what the gathering keeps is the next picture's.
+        surface, light, rest = (self.device.texture(size, "RGBA32F") for _ in range(3))
+        own = self.device.target([surface, light, rest])
         self.device.fullscreen(
             VIEW_BOUND,
-            grid.gather_targets[0],
+            own,
             normal_tx=inputs.gbuffer.normal,
             **candidates,
-            pc_stride=stride,
+            pc_stride=now.stride,
             pc_offset=now.offset,
         )
-        self.device.clear(target)
-        self._upsample(inputs, now, grid, grid.gathered[0], target)
+        self._upsample(inputs, now, surface, light, target)
+        for resource in (own, surface, light, rest):
+            self.device.free(resource)
+
+    def view_resolution(self, inputs: FrameInputs, target: Target) -> None:
+        """Draw which pixels gathered, and how well they do for the others."""
+        assert self._grid is not None and self._drawn is not None
+        self.device.fullscreen(
+            VIEW_RESOLUTION,
+            target,
+            position_tx=inputs.gbuffer.position,
+            normal_tx=inputs.gbuffer.normal,
+            surface_tx=self._grid.surfaces[0],
+            pc_stride=self._drawn.stride,
+            pc_offset=self._drawn.offset,
+        )
 
     def view_history(self, settings: Mapping[str, Value], target: Target) -> None:
         """Draw how many samples each pixel's mean stands for."""
@@ -176,7 +203,7 @@ class Gathering:
     def free(self) -> None:
         for resource in self._grid.resources if self._grid else ():
             self.device.free(resource)
-        self._grid = self._before = None
+        self._grid = self._before = self._drawn = None
 
     def _reuse(self, inputs: FrameInputs, grid: _Grid, candidates: Mapping[str, Any], now: _Before) -> None:
         before = self._before
@@ -223,7 +250,7 @@ class Gathering:
             pc_offset=now.offset,
         )
         for light, target in zip(grid.reflected, (targets.glossy_indirect, targets.glossy_direct), strict=True):
-            self._upsample(inputs, now, grid, light, target)
+            self._upsample(inputs, now, grid.surfaces[0], light, target)
 
     def _filtered(self, grid: _Grid) -> Texture:
         newest = 0
@@ -233,14 +260,14 @@ class Gathering:
             newest = 1 - newest
         return grid.noisy[newest]
 
-    def _upsample(self, inputs: FrameInputs, now: _Before, grid: _Grid, light: Texture, target: Target) -> None:
+    def _upsample(self, inputs: FrameInputs, now: _Before, surface: Texture, light: Texture, target: Target) -> None:
         self.device.fullscreen(
             UPSAMPLE,
             target,
             state=ADD,
             position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
-            surface_tx=grid.surfaces[0],
+            surface_tx=surface,
             light_tx=light,
             pc_stride=float(now.stride),
             pc_offset=now.offset,

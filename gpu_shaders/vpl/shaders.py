@@ -161,6 +161,36 @@ VIEW_HISTORY = Shader(
     constants={"pc_stride": "INT", "pc_many": "FLOAT"},
 )
 
+VIEW_RESOLUTION = Shader(
+    name="vpl_view_resolution",
+    fragment="vpl/vpl_view_resolution_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "surface_tx": "FLOAT_2D"},
+    constants={"pc_stride": "INT", "pc_offset": "IVEC2"},
+)
+VIEW_OCCLUSION = Shader(
+    name="vpl_view_occlusion",
+    fragment="vpl/vpl_view_occlusion_frag.glsl",
+    outputs={"out_color": "VEC4"},
+    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", **VOXEL_SAMPLERS},
+    uniforms={"voxel_grid": VOXEL_GRID},
+    constants={"pc_eye": "VEC4", "pc_reach": "FLOAT", "pc_sample": "INT", "pc_seed": "INT"},
+)
+VIEW_POOL = Shader(
+    name="vpl_view_pool",
+    vertex="vpl/vpl_view_pool_vert.glsl",
+    fragment="vpl/vpl_view_pool_frag.glsl",
+    varyings={"v_position": "VEC3", "v_color": "VEC3"},
+    outputs={"out_color": "VEC4"},
+    samplers={
+        "position_tx": "FLOAT_2D",
+        **{f"pool_{name}_tx": "FLOAT_2D" for name in ("position", "normal", "flux", "specular")},
+        "sums_tx": "FLOAT_2D",
+    },
+    constants={"pc_clip_from_world": "MAT4", "pc_eye": "VEC4", "pc_pixel": "VEC2", "pc_tiles": "INT"},
+    defines=_DEFINES,
+)
+
 REFLECT = _candidate_pass(
     "vpl_reflect",
     "vpl/vpl_reflect_frag.glsl",
@@ -275,6 +305,9 @@ SHADERS = (
     VIEW_BOUND,
     VIEW_VOXELS,
     VIEW_HISTORY,
+    VIEW_RESOLUTION,
+    VIEW_OCCLUSION,
+    VIEW_POOL,
     REFLECT,
     *REUSE.values(),
     ATROUS,

@@ -33,7 +33,7 @@ def variations():
     """Settings that differ from the defaults in one: every choice, every lower limit, the upper one of a number."""
     yield {}
     for name, setting in named_settings():
-        if name in ("samples", "show"):  # counted by the caller of the renderer; in place of the picture
+        if name in ("samples", "show", "show_light"):  # counted by the caller; views have tests of their own
             continue
         values = [setting.minimum]
         if setting.kind == "ENUM":
@@ -110,30 +110,16 @@ def test_scene_without_meshes_or_lights_is_drawn(studio, shown):
     np.testing.assert_allclose(found["environment"][0, 0], (1, 2, 3))
 
 
-VIEWS_OF = [(technique.id.upper(), view.key) for technique in TECHNIQUES for view in technique.views]
-
-
-@pytest.mark.parametrize(("method", "view"), VIEWS_OF, ids=str)
-def test_views_show_something_else_at_any_size(studio, method, view):
-    reuse = {f"{method.lower()}_reuse": True}
-    for place in VIEWS.values():
-        picture = studio.render(SCENE, place, 2, ALL, method=method, **reuse)
-        shown = studio.render(SCENE, place, 2, ALL, method=method, show=view, **reuse)
-        assert np.isfinite(shown["combined"]).all()
-        same({"diffuse_direct": shown["diffuse_direct"]}, {"diffuse_direct": picture["diffuse_direct"]})
-    assert (shown["combined"] != picture["combined"]).any()
-
-
 def test_method_none_runs_no_technique(headless_device):
     studio = Studio(headless_device)
     lamps_only = replace(SCENE, world=World())  # a world's light comes from the technique
     found = studio.render(lamps_only, VIEWS["orthographic"], 1, ALL, method="NONE")
     assert not found["diffuse_indirect"].any() and found["diffuse_direct"].any()
-    assert not [name for name in studio.renderer.statistics() if name.startswith("rsm")]
+    assert not [name for name in studio.renderer.statistics() if name.startswith("light_")]
     with_bounce = studio.render(lamps_only, VIEWS["orthographic"], 1, ALL)
     same({"diffuse_direct": with_bounce["diffuse_direct"]}, {"diffuse_direct": found["diffuse_direct"]})
     studio.render(SCENE, VIEWS["orthographic"], 1, method="NONE")
-    assert not [name for name in studio.renderer.statistics() if name.startswith("rsm")]  # its memory is given back
+    assert not [name for name in studio.renderer.statistics() if name.startswith("light_")]  # its memory is given back
     studio.free()
 
 

@@ -39,7 +39,7 @@ def work(studio, shown, view=VIEW, **settings):
     studio.gpu_scene.uploads.clear()
     studio.render(shown, view, 1, **{"soft_shadows": "FILTERED", **settings})
     after = studio.renderer.statistics()
-    drawn = [int(after[name] - before.get(name, 0)) for name in ("rsm_maps_drawn", "shadow_maps_drawn")]
+    drawn = [int(after[name] - before.get(name, 0)) for name in ("light_maps_drawn", "shadow_maps_drawn")]
     return (*drawn, dict(studio.gpu_scene.uploads))
 
 

@@ -106,12 +106,12 @@ def test_light_split_into_many_bounces_as_one(studio):
 def test_moving_one_of_many_lights_redraws_its_map_alone(headless_device):
     studio = Studio(headless_device)
     gathered(studio, split(PARTS), VIEW, 1)
-    before = studio.renderer.statistics()["rsm_maps_drawn"]
+    before = studio.renderer.statistics()["light_maps_drawn"]
     matrix = PARTS[7].world_from_light.copy()
     matrix[0, 3] += 0.05
     gathered(studio, split([*PARTS[:7], replace(PARTS[7], world_from_light=matrix), *PARTS[8:]]), VIEW, 2)
     after = studio.renderer.statistics()
-    assert after["rsm_maps"] == MANY and after["rsm_maps_drawn"] - before == 1
+    assert after["light_maps"] == MANY and after["light_maps_drawn"] - before == 1
     studio.free()
 
 
