@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from mathutils import Matrix
 
@@ -62,9 +64,10 @@ class REBOUND_GT_split_line(bpy.types.Gizmo):
         )
         self.draw_custom_shape(self.arrows, matrix=center @ Matrix.Diagonal((HANDLE * scale, HANDLE * scale, 1.0, 1.0)))
 
-    def test_select(self, context, location):
+    def test_select(self, context, location: Any):
         place, scale = context.scene.rebound.viewport_split_place, context.preferences.system.ui_scale
-        return 0 if line_is_near(place, context.region.width, location[0], scale) else -1
+        x, _y = location
+        return 0 if line_is_near(place, context.region.width, x, scale) else -1
 
     def invoke(self, context, _event):
         self.before = context.scene.rebound.viewport_split_place
