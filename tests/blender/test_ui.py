@@ -155,9 +155,9 @@ def test_show_offers_views_of_the_method_only_and_keeps_others(rebound_scene):
     group.method = "RSM"
     offered = draw(menu, Context(rebound_scene))
     assert "show.PICTURE" in offered and not [name for name in offered if "VPL" in name]
-    assert panels._shown(group, "show") == "Picture"
+    assert panels.shown_label(group, "show") == "Picture"
     group.method = "VPL"
-    assert group.show == "VPL_VOXELS" and panels._shown(group, "show") == "Voxels"
+    assert group.show == "VPL_VOXELS" and panels.shown_label(group, "show") == "Voxels"
 
 
 def test_memory_in_use_is_shown(rebound_scene, monkeypatch):

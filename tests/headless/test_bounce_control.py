@@ -63,7 +63,7 @@ def test_excluded_light_gives_no_bounce_and_draws_no_map(studio, method):
     alone = shot(studio, [replace(KEY, bounce=0.0)], method)
     assert not alone["diffuse_indirect"].any()
     assert alone["diffuse_direct"].any()
-    assert studio.renderer.statistics()["rsm_maps"] == 0
+    assert studio.renderer.statistics()["light_maps"] == 0
     one = shot(studio, [FILL], method)
     other = shot(studio, [replace(KEY, bounce=0.0), FILL], method)
     assert other["diffuse_indirect"].mean() == pytest.approx(one["diffuse_indirect"].mean(), rel=1e-4)
@@ -138,7 +138,7 @@ def test_strength_redraws_its_own_maps_only(studio, method):
         before = studio.renderer.statistics()
         shot(studio, lamps, method, 1, **fields)
         after = studio.renderer.statistics()
-        drawn = [int(after[name] - before.get(name, 0)) for name in ("rsm_maps_drawn", "shadow_maps_drawn")]
+        drawn = [int(after[name] - before.get(name, 0)) for name in ("light_maps_drawn", "shadow_maps_drawn")]
         return (*drawn, dict(studio.gpu_scene.uploads))
 
     work([KEY, FILL])
