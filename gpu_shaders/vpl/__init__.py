@@ -19,8 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from ...device.interface import Device, Target
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.map_views import draw_maps
