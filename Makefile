@@ -5,6 +5,7 @@
 #   make test-all   the suite on every Blender this machine can run, on OpenGL and on Vulkan
 #   make lint       the linters alone
 #   make format     rewrite Python and GLSL the way lint wants them
+#   make manual     docs/manual as web pages, into out/manual
 #   make package    dist/rebound-<version>.zip, to install in Blender
 #   make setup      only make the virtual environment
 #   make bench      measure Rebound beside EEVEE and Cycles, into docs/performance.md (hours on software OpenGL;
@@ -20,7 +21,7 @@ BLENDER ?=
 BENCH ?=
 VENV := $(if $(BLENDER),.venv-$(BLENDER),.venv)
 
-.PHONY: render test test-all lint format package setup setup-render bench report bench-gpu clean
+.PHONY: render test test-all lint format manual package setup setup-render bench report bench-gpu clean
 
 render: setup-render
 	@$(VENV)/bin/python tools/render_example.py
@@ -36,6 +37,11 @@ lint: setup
 
 format: setup
 	@$(VENV)/bin/python tools/lint.py --fix
+
+manual: setup
+	@$(VENV)/bin/python tools/settings_page.py
+	@NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --strict --quiet
+	@echo "manual: out/manual/index.html"
 
 package: setup-render
 	@$(VENV)/bin/python tools/package.py

@@ -1,5 +1,6 @@
 """The texts a reader meets first: links lead somewhere, pictures carry nothing but pixels."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -23,3 +24,9 @@ def test_pictures_carry_no_text(path):
     with Image.open(path) as picture:
         picture.load()
         assert not picture.text
+
+
+def test_page_of_settings_is_what_they_say_of_themselves(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    made = importlib.import_module("settings_page").page()
+    assert made == (ROOT / "docs" / "manual" / "settings.md").read_text(encoding="utf-8"), "run `make manual`"
