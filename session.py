@@ -17,6 +17,7 @@ import numpy as np
 from .device.blender import BlenderDevice
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame import DISPLAY, SPLIT
+from .gpu_shaders.technique import Setting, Value
 from .renderer import Frame, Renderer, RsmBuffers
 from .scene.changes import Changes
 from .scene.convert import convert_scene
@@ -246,12 +247,19 @@ SESSIONS = Sessions()
 
 
 def read_settings(scene, *, viewport: bool) -> Settings:
-    """The values of ``scene.rebound``; the viewport's own where a setting has them."""
+    """The values of ``scene.rebound``; the viewport's own where a setting has them.
+
+    A choice that a newer Rebound made reads as nothing: its default is used, which the panel says (ui.versions).
+    """
     group = scene.rebound
 
-    def value(name, setting):
-        own = viewport and setting.viewport_default is not None
-        return getattr(group, f"viewport_{name}" if own else name)
+    def value(name: str, setting: Setting) -> Value:
+        default = setting.viewport_default if viewport else None
+        own = default is not None
+        found = getattr(group, f"viewport_{name}" if own else name)
+        if setting.kind == "ENUM" and not found:
+            return default if own else setting.default
+        return found
 
     values = {name: value(name, setting) for name, setting in named_settings()}
     for setting in VIEWPORT_SETTINGS:

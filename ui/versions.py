@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
@@ -31,7 +32,7 @@ class Step:
     version: int
     old: str
     new: tuple[str, ...] = ()
-    value: Callable[[object], object] = lambda value: value
+    value: Callable[[Any], Any] = lambda value: value
 
 
 STEPS = (
@@ -63,9 +64,15 @@ def migrate(held, steps: Iterable[Step], version: int) -> list[str]:
 
 def file_notes(scene) -> list[str]:
     """What the panel says of the file that a scene comes from; empty where all is well."""
-    if scene.rebound.version <= VERSION:
+    group = scene.rebound
+    if group.version <= VERSION:
         return []
-    return [f"Saved by a newer Rebound (settings {scene.rebound.version}, known {VERSION}): update to see it as it was"]
+    lines = [f"Saved by a newer Rebound (settings {group.version}, known {VERSION}): update to see it as it was"]
+    for name, value in stored(group).items():
+        entry = group.bl_rna.properties.get(name)
+        if entry is not None and entry.type == "ENUM" and value not in {item.value for item in entry.enum_items}:
+            lines.append(f"'{entry.name}' has a choice that is not known here: its default is used")
+    return lines
 
 
 @bpy.app.handlers.persistent
