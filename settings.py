@@ -231,9 +231,9 @@ def views_of(method: str) -> tuple[str, ...]:
 
 
 def every_setting() -> Iterator[tuple[str, Setting]]:
-    """Settings of the scene by their full names, then those of lights and of objects."""
+    """Settings of the scene by their full names, then those of viewports alone, of lights and of objects."""
     yield from named_settings()
-    for setting in (*LIGHT_SETTINGS, *OBJECT_SETTINGS):
+    for setting in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS, *LIGHT_SETTINGS, *OBJECT_SETTINGS):
         yield setting.name, setting
 
 

@@ -18,7 +18,7 @@ SUBDIR = "rebound"
 ROOT = str(Path(__file__).parent)
 SHIPPED = ("Draft", "Balanced", "High", "Final")  # quickest first
 # What is no matter of quality.
-NOT_KEPT = {"seed", "show"}
+NOT_KEPT = {"seed", "show", "show_light"}
 
 
 def shipped_file(name: str) -> Path:

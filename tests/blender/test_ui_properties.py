@@ -3,7 +3,14 @@
 import bpy
 import pytest
 
-from rebound.settings import LIGHT_SETTINGS, OBJECT_SETTINGS, choice_number, named_settings
+from rebound.settings import (
+    DISPLAY_SETTINGS,
+    LIGHT_SETTINGS,
+    OBJECT_SETTINGS,
+    VIEWPORT_SETTINGS,
+    choice_number,
+    named_settings,
+)
 from rebound.tests.support.engine_build import rebound_scene
 
 __all__ = ["rebound_scene"]
@@ -15,6 +22,8 @@ def every_property():
         yield "scene", name, name, setting
         if setting.viewport_default is not None:
             yield "scene", f"viewport_{name}", name, setting
+    for setting in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS):
+        yield "scene", f"viewport_{setting.name}", f"viewport_{setting.name}", setting
     for owner, settings in (("light", LIGHT_SETTINGS), ("object", OBJECT_SETTINGS)):
         for setting in settings:
             yield owner, setting.name, setting.name, setting
