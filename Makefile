@@ -3,6 +3,8 @@
 #   make render     render examples/cornell_box.blend to out/
 #   make test       lint and the test suite, on one Blender (make test BLENDER=4.5 for another)
 #   make test-all   the suite on every Blender this machine can run, on OpenGL and on Vulkan
+#   make test-window  the same extension in a real Blender window on a virtual screen, with mouse and keys
+#                   (make test-window WINDOW="views --backend vulkan" for one scenario; needs root and network once)
 #   make lint       the linters alone
 #   make format     rewrite Python and GLSL the way lint wants them
 #   make manual     docs/manual as web pages, into out/manual
@@ -19,9 +21,10 @@ PYTHON ?= $(shell for python in python3 python3.13 python3.11 /usr/bin/python3 $
 	"$$python" -c "import tomllib" 2>/dev/null && echo "$$python" && break; done)
 BLENDER ?=
 BENCH ?=
+WINDOW ?=
 VENV := $(if $(BLENDER),.venv-$(BLENDER),.venv)
 
-.PHONY: render test test-all lint format manual package setup setup-render bench report bench-gpu clean
+.PHONY: render test test-all test-window lint format manual package setup setup-render bench report bench-gpu clean
 
 render: setup-render
 	@$(VENV)/bin/python tools/render_example.py
@@ -31,6 +34,9 @@ test: lint
 
 test-all: python
 	@$(PYTHON) tools/test_all.py
+
+test-window: setup-render
+	@$(VENV)/bin/python tools/test_window.py $(WINDOW)
 
 lint: setup
 	@$(VENV)/bin/python tools/lint.py

@@ -43,6 +43,11 @@ class MainThread:
     def __init__(self) -> None:
         self._jobs: queue.SimpleQueue[tuple[Future, Callable[[], object]]] = queue.SimpleQueue()
         self._newest_job = 0.0
+        self._rendered = False  # whether viewports wait for a final render to end
+
+    def is_busy(self) -> bool:
+        """True while a final render gives this thread work; all viewports are redrawn when that ends."""
+        return time.monotonic() - self._newest_job < BUSY_AFTER_JOB
 
     def run(self, call: Callable[[], T], cancelled: Callable[[], bool], *, patience: float = NO_ANSWER) -> T:
         """Run ``call`` on the main thread and return what it returns, or raise what it raises.
@@ -92,7 +97,18 @@ class MainThread:
             _complete(*job)
             del job  # an error refers to the frames it came through and to their callers, so to this one
             self._newest_job = time.monotonic()
-        return BUSY_INTERVAL if time.monotonic() - self._newest_job < BUSY_AFTER_JOB else IDLE_INTERVAL
+        busy = self.is_busy()
+        if self._rendered and not busy:
+            _redraw_viewports()
+        self._rendered = busy
+        return BUSY_INTERVAL if busy else IDLE_INTERVAL
+
+
+def _redraw_viewports() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 def _log_error(future: Future) -> None:

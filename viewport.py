@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import blf
 import gpu
 from mathutils import Matrix
 
-from .scene.cameras import region_view
+from .main_thread import MAIN_THREAD
+from .scene.cameras import Border, region_border, region_view
 from .scene.data import Scene
 from .session import SESSIONS, Session, read_settings
 from .settings import Settings
@@ -41,7 +44,8 @@ class Viewport:
 
     def draw(self, context, depsgraph) -> None:
         """Work on the picture for a bounded time and draw it."""
-        view = region_view(context.region, context.region_data)
+        border = region_border(context.region, context.region_data, context.space_data, depsgraph.scene)
+        view = region_view(context.region, context.region_data, border)
         settings = _of_active_light(read_settings(depsgraph.scene, viewport=True), self.session.scene, depsgraph)
         attempt = (settings, view.width, view.height)
         if not self._synced or attempt == self._failed_for:
@@ -50,11 +54,14 @@ class Viewport:
         self.session.status.region = context.region.as_pointer()
         picture, wanted = self.session.picture(view, settings, SHOWN), int(settings["samples"])
         picture.time_passes(depsgraph.scene.rebound.viewport_stats)
-        if picture.lacks(wanted):
+        # A final render shares the main thread: beside a viewport that goes on it would hardly get anywhere.
+        working = picture.lacks(wanted) and not (picture.samples and MAIN_THREAD.is_busy())
+        if working:
             picture.advance(SECONDS_PER_DRAW)
-        picture.show(depsgraph.scene.rebound.viewport_split_place)
+        with _within(border):
+            picture.show(_split_place(depsgraph.scene.rebound.viewport_split_place, context.region, border))
         self._failed_for, self.error = None, ""
-        self.unfinished = picture.lacks(wanted)
+        self.unfinished = working and picture.lacks(wanted)
         self.progress = f"Sample {picture.samples}/{wanted}"
 
     def fail(self, message: str) -> None:
@@ -88,6 +95,27 @@ def _of_active_light(settings: Settings, scene: Scene, depsgraph) -> Settings:
     names = [light.name for light in scene.lights]
     number = names.index(active.name) + 1 if active is not None and active.name in names else 0
     return Settings({**settings.values, "show_light": number})
+
+
+@contextmanager
+def _within(border: Border | None) -> Iterator[None]:
+    """Full-screen draws fill only the border's pixels of the region."""
+    whole = gpu.state.viewport_get()
+    if border is not None:
+        left, bottom, right, top = border
+        gpu.state.viewport_set(whole[0] + left, whole[1] + bottom, right - left, top - bottom)
+    try:
+        yield
+    finally:
+        gpu.state.viewport_set(*whole)
+
+
+def _split_place(place: float, region, border: Border | None) -> float:
+    """Where the divider of a split view stands in what is drawn, 0 to 1, from where it stands in the region."""
+    if border is None:
+        return place
+    left, _bottom, right, _top = border
+    return min(max((place * region.width - left) / (right - left), 0.0), 1.0)
 
 
 def _pixel_space(width: int, height: int) -> Matrix:

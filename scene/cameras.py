@@ -74,14 +74,52 @@ def camera_view(camera, depsgraph, engine=None, *, width: int, height: int, bord
     return View(_rigid_inverse(world, camera.name), clip_from_view, width, height)
 
 
-def region_view(region, region_data) -> View:
-    """The view of a 3D viewport region (``context.region`` and ``context.region_data``)."""
-    return View(
-        np.array(region_data.view_matrix, np.float64),
-        np.array(region_data.window_matrix, np.float64),
-        max(region.width, 1),
-        max(region.height, 1),
-    )
+def region_view(region, region_data, border: Border | None = None) -> View:
+    """The view of a 3D viewport region (``context.region`` and ``context.region_data``), or of its border only."""
+    width, height = max(region.width, 1), max(region.height, 1)
+    clip_from_view = np.array(region_data.window_matrix, np.float64)
+    if border is not None:
+        clip_from_view = window_from_full(border, width, height) @ clip_from_view
+        width, height = border[2] - border[0], border[3] - border[1]
+    return View(np.array(region_data.view_matrix, np.float64), clip_from_view, width, height)
+
+
+def region_border(region, region_data, space, scene) -> Border | None:
+    """The pixels of a 3D viewport region that its render region leaves, or None where there is none.
+
+    Through the camera that is the scene's border, a part of the camera's frame; elsewhere the viewport's own. What lies
+    outside of the region is cut off; a border that has nothing of it keeps one pixel.
+    """
+    width, height = max(region.width, 1), max(region.height, 1)
+    through_camera, render = region_data.view_perspective == "CAMERA", scene.render
+    if not (render.use_border if through_camera else space.use_render_border):
+        return None
+    if through_camera:
+        frame = _camera_frame(region_data, space, scene, width, height)
+        low, high = (render.border_min_x, render.border_min_y), (render.border_max_x, render.border_max_y)
+    else:
+        frame = 0.0, 0.0, float(width), float(height)
+        low = space.render_border_min_x, space.render_border_min_y
+        high = space.render_border_max_x, space.render_border_max_y
+    if frame is None:
+        return None
+    left, bottom, right, top = frame
+    x0, x1 = (min(max(int(left + side[0] * (right - left)), 0), width) for side in (low, high))
+    y0, y1 = (min(max(int(bottom + side[1] * (top - bottom)), 0), height) for side in (low, high))
+    x0, y0 = min(x0, width - 1), min(y0, height - 1)
+    return x0, y0, max(x1, x0 + 1), max(y1, y0 + 1)
+
+
+def _camera_frame(region_data, space, scene, width: int, height: int) -> tuple[float, float, float, float] | None:
+    """Left, bottom, right and top of the camera's frame in pixels of the region; None if there is no camera."""
+    camera = space.camera if space.use_local_camera else scene.camera
+    if camera is None or camera.type != "CAMERA":
+        return None
+    corners = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
+    # The frame stands before the camera as the region shows it, whatever the camera's scale.
+    clip = corners @ np.array(region_data.window_matrix, np.float64).T
+    x, y = ((clip[:, axis] / clip[:, 3] * 0.5 + 0.5) * size for axis, size in ((0, width), (1, height)))
+    return float(x.min()), float(y.min()), float(x.max()), float(y.max())
 
 
 def window_from_full(border: Border, width: int, height: int) -> Array:

@@ -7,6 +7,7 @@ import weakref
 
 import pytest
 
+from rebound import main_thread as module
 from rebound.main_thread import BUSY_INTERVAL, IDLE_INTERVAL, Cancelled, MainThread, MainThreadError
 
 
@@ -164,6 +165,20 @@ def test_timer_is_fast_only_while_there_is_work(work, interval):
     if work:
         main_thread.later(lambda: None)
     assert main_thread.tick() == interval
+
+
+def test_viewports_are_redrawn_once_when_a_render_ends(monkeypatch):
+    main_thread, redrawn = MainThread(), []
+    monkeypatch.setattr(module, "_redraw_viewports", lambda: redrawn.append(1))
+    monkeypatch.setattr(module, "BUSY_AFTER_JOB", 0.05)
+    main_thread.tick()
+    main_thread.later(lambda: None)
+    main_thread.tick()
+    assert main_thread.is_busy() and not redrawn
+    time.sleep(0.06)
+    main_thread.tick()
+    main_thread.tick()
+    assert not main_thread.is_busy() and redrawn == [1]
 
 
 def test_one_tick_is_bounded():

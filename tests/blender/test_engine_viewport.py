@@ -8,7 +8,8 @@ from mathutils import Matrix
 
 from rebound import engine
 from rebound import viewport as viewport_module
-from rebound.session import SESSIONS, Session
+from rebound.main_thread import MAIN_THREAD
+from rebound.session import SESSIONS, Picture, Session
 from rebound.tests.support.engine_build import rebound_scene
 from rebound.tests.support.viewport_build import View
 from rebound.viewport import Viewport
@@ -48,6 +49,44 @@ def test_orbit_uploads_nothing_and_starts_anew(view):
     view.draw()
     assert view.picture is not first and view.picture.samples == 1
     assert dict(view.viewport.session._gpu.scene.uploads) == uploads
+
+
+def test_render_region_is_drawn_alone_and_in_its_place(view):
+    view.scene.rebound.method = "NONE"  # whose noise is another one in a smaller picture
+    whole = view.finish()
+    view.set_border((0.25, 0.5), (0.75, 1.0))
+    part = view.finish()
+    height, width = whole.shape[:2]
+    inside = np.s_[height // 2 :, width // 4 : width * 3 // 4]
+    # A pixel at the edge of a shadow may fall to the other side of it: its place is rounded otherwise.
+    assert (np.abs(part[inside] - whole[inside]) > 0.005).mean() < 0.01
+    assert part[..., 3].sum() == part[inside][..., 3].size  # nothing, not even black, beside it
+    view.context.space_data.use_render_border = False
+    np.testing.assert_array_equal(view.finish(), whole)
+
+
+def test_line_of_a_split_view_stands_where_it_does_with_a_render_region(view):
+    view.scene.rebound.viewport_split, view.scene.rebound.viewport_split_place = True, 0.5
+    view.set_border((0.5, 0.0), (1.0, 1.0))
+    shown = []
+    show = Picture.show
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Picture, "show", lambda self, place: (shown.append(place), show(self, place)))
+        view.draw()
+        view.set_border((0.25, 0.0), (1.0, 1.0))
+        view.draw()
+    assert shown == [0.0, pytest.approx(1 / 3)]
+
+
+def test_viewport_rests_while_a_final_render_works(view, monkeypatch):
+    monkeypatch.setattr(MAIN_THREAD, "is_busy", lambda: True)
+    view.draw()
+    assert view.picture.samples == 1  # something to see there must be
+    view.draw()
+    assert view.picture.samples == 1 and not view.viewport.unfinished
+    monkeypatch.setattr(MAIN_THREAD, "is_busy", lambda: False)
+    view.finish()
+    assert view.picture.samples == 3
 
 
 def test_update_without_a_change_goes_on(view):

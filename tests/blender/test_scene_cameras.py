@@ -256,14 +256,79 @@ def test_depth_of_field_and_motion_blur_are_named_in_a_final_render():
     assert not convert_scene(depsgraph, for_viewport=True).warnings
 
 
+class Region:
+    width, height = 200, 100
+
+
+class RegionData:
+    """A region that looks at the world through Blender's camera frame, twice as wide as it."""
+
+    view_perspective = "PERSP"
+    view_matrix = np.eye(4)
+    window_matrix = np.diag((1, 2, 3, 1))
+
+
+class Space:
+    use_local_camera, camera = False, None
+    use_render_border = False
+    render_border_min_x, render_border_max_x, render_border_min_y, render_border_max_y = 0.25, 0.5, 0.1, 0.9
+
+
 def test_region_view_takes_the_viewports_matrices():
-    class Region:
+    class Narrow:
         width, height = 0, 30
 
-    class RegionData:
-        view_matrix = np.eye(4)
-        window_matrix = np.diag((1, 2, 3, 1))
-
-    view = cameras.region_view(Region, RegionData)
+    view = cameras.region_view(Narrow, RegionData)
     assert (view.width, view.height) == (1, 30)
     np.testing.assert_array_equal(view.clip_from_view, RegionData.window_matrix)
+
+
+def test_region_border_is_the_viewports_own_and_off_by_default():
+    assert cameras.region_border(Region, RegionData, Space, bpy.context.scene) is None
+
+    class Bordered(Space):
+        use_render_border = True
+
+    border = cameras.region_border(Region, RegionData, Bordered, bpy.context.scene)
+    assert border == (50, 10, 100, 90)
+    whole, part = (pixels_of(cameras.region_view(Region, RegionData, given)) for given in (None, border))
+    np.testing.assert_allclose(part, whole - np.array((50, 10)), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_region_border_through_a_camera_is_a_part_of_its_frame(kind):
+    seen = camera(type=kind, scale=(2, 2, 2), shift_x=0.1, ortho_scale=5.0)
+    scene = bpy.context.scene
+    resolution(300, 100)
+    scene.render.use_border = True
+    scene.render.border_min_x, scene.render.border_max_x = 0.0, 0.5
+    scene.render.border_min_y, scene.render.border_max_y = 0.0, 1.0
+
+    class Through(RegionData):
+        """The frame of 3 : 1 fills the region's width, 200 pixels, and two thirds of its height."""
+
+        view_perspective = "CAMERA"
+        window_matrix = np.diag((1, 2 / 3, 1, 1)) @ np.array(
+            seen.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=300, y=100)
+        )
+
+    border = cameras.region_border(Region, Through, Space, scene)
+    assert border is not None
+    np.testing.assert_allclose(border, (0, 17, 100, 83), atol=1)
+
+
+def test_region_border_outside_of_the_region_keeps_one_pixel():
+    class Outside(Space):
+        use_render_border = True
+        render_border_min_x, render_border_max_x = 1.0, 1.0
+
+    assert cameras.region_border(Region, RegionData, Outside, bpy.context.scene) == (199, 10, 200, 90)
+
+
+def test_region_border_through_what_is_no_camera_is_none():
+    class Through(RegionData):
+        view_perspective = "CAMERA"
+
+    bpy.context.scene.camera = link("Empty", None)
+    bpy.context.scene.render.use_border = True
+    assert cameras.region_border(Region, Through, Space, bpy.context.scene) is None

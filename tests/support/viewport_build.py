@@ -20,9 +20,12 @@ class View:
         camera = scene.camera
         bpy.context.view_layer.update()
         projection = camera.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=width, y=height)
-        region_data = SimpleNamespace(view_matrix=camera.matrix_world.inverted(), window_matrix=projection)
+        region_data = SimpleNamespace(
+            view_matrix=camera.matrix_world.inverted(), window_matrix=projection, view_perspective="PERSP"
+        )
+        space = SimpleNamespace(use_render_border=False)
         region = SimpleNamespace(width=width, height=height, as_pointer=lambda: id(self))
-        self.context = SimpleNamespace(region=region, region_data=region_data, space_data=None)
+        self.context = SimpleNamespace(region=region, region_data=region_data, space_data=space)
 
     def update(self):
         # Local view is asked of a real 3D viewport, which there is none of in background.
@@ -43,6 +46,13 @@ class View:
         pixels = np.array(buffer, np.float32).reshape(region.height, region.width, 4)
         target.free()
         return pixels
+
+    def set_border(self, low, high):
+        """The viewport's render region, from (x, y) to (x, y) in parts of the region."""
+        space = self.context.space_data
+        space.use_render_border = True
+        space.render_border_min_x, space.render_border_min_y = low
+        space.render_border_max_x, space.render_border_max_y = high
 
     def finish(self):
         """Redraw until the picture is finished; the last pixels."""

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import bpy
-from steps import check, run, screenshot, wait_for, window_context
-
-from rebound import final_render
-from rebound.ui import panels
+from steps import (
+    check,
+    module,
+    rendering,
+    run,
+    screenshot,
+    select,
+    wait_for,
+    window_context,
+)
 
 TABS = ("RENDER", "OUTPUT", "VIEW_LAYER", "SCENE", "WORLD", "OBJECT", "DATA", "MATERIAL")
 PREVIEWS: list[tuple[int, int]] = []
@@ -14,6 +20,7 @@ PREVIEWS: list[tuple[int, int]] = []
 
 def note_previews() -> None:
     """Note the size of every preview picture that is rendered."""
+    final_render = module("final_render")
     view = final_render._view
 
     def noted(engine, depsgraph):
@@ -24,15 +31,9 @@ def note_previews() -> None:
     final_render._view = noted
 
 
-def select(name: str) -> None:
-    for obj in bpy.context.view_layer.objects:
-        obj.select_set(obj.name == name)
-    bpy.context.view_layer.objects.active = bpy.data.objects[name]
-
-
 def open_all_panels() -> None:
     """As if the user had opened every panel: what is closed is not drawn, and would hide a fault."""
-    for panel in panels.CLASSES:
+    for panel in module("ui.panels").CLASSES:
         if "DEFAULT_CLOSED" in getattr(panel, "bl_options", ()):
             bpy.utils.unregister_class(panel)
             panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"}
@@ -66,23 +67,30 @@ def scenario():
     check("the material's preview is rendered with Rebound", bool(PREVIEWS), PREVIEWS[:3])
     yield 3.0
     screenshot("material_tab")
-    scene.camera.scale = (0, 0, 0)
-    yield from press_f12(window, area)
-    check("a failed render ends", not bpy.app.is_job_running("RENDER"))
-    screenshot("f12_error")
-    bpy.data.objects.remove(scene.camera)
-    try:
-        yield from press_f12(window, area)
-        check("a render without camera is refused", False)
-    except RuntimeError as error:
-        check("a render without camera is refused", "No camera" in str(error))
+    yield from f12_errors(window, area)
 
 
-def press_f12(window, area):
+def f12_errors(window, area):
+    """What F12 cannot render ends at once."""
+    camera = bpy.context.scene.camera
+    camera.scale = (0, 0, 0)
     with bpy.context.temp_override(window=window, area=area):
-        bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from wait_for(lambda: not bpy.app.is_job_running("RENDER"), 20)
+        try:
+            bpy.ops.render.render("INVOKE_DEFAULT")
+        except RuntimeError as error:  # where it failed before the operator returned
+            check("a failed render says why", "zero scale" in str(error), error)
     yield 1.0
+    yield from wait_for(lambda: not rendering(), 20)
+    check("a failed render ends", not rendering())
+    yield 1.0
+    screenshot("f12_error")
+    bpy.data.objects.remove(camera)
+    try:
+        with bpy.context.temp_override(window=window, area=area):
+            bpy.ops.render.render("INVOKE_DEFAULT")
+        check("a render without camera is refused", False)
+    except RuntimeError as refusal:
+        check("a render without camera is refused", "No camera" in str(refusal))
 
 
 run(scenario)

@@ -1,4 +1,8 @@
-"""What every window scenario uses: a generator of waiting times that Blender's timers drive, checks, screenshots."""
+"""What every window scenario uses: a generator of waiting times that Blender's timers drive, checks, eyes and hands.
+
+Rebound is the installed extension: ``module("viewport")`` is its viewport.py. Places on the screen are pixels from its
+upper left corner, as the mouse has them; Blender counts from the lower left.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,25 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from importlib import import_module
+from types import ModuleType
+from typing import Any
 
 import bpy
+import numpy as np
 
-import rebound
-
+PACKAGE = "bl_ext.user_default.rebound"
 OUT = os.environ["WINDOW_OUT"]
+SCREEN = (1280, 800)
 FAILURES: list[str] = []
+
+Place = tuple[int, int]
+Steps = Iterator[float]
+
+
+def module(name: str) -> ModuleType:
+    """A module of the installed extension."""
+    return import_module(f"{PACKAGE}.{name}")
 
 
 def say(*words) -> None:
@@ -22,10 +38,69 @@ def say(*words) -> None:
     sys.stdout.flush()
 
 
-def check(what: str, passed: bool, *details) -> None:
+def check(what: str, passed, *details) -> None:
     say("ok  " if passed else "FAIL", what, *details)
     if not passed:
         FAILURES.append(what)
+
+
+# --- what there is in the window -------------------------------------------------------------------------------------
+
+
+def areas(kind: str) -> list[tuple[Any, Any]]:
+    """(window, area) of every editor of a kind, in Blender's order."""
+    windows = bpy.context.window_manager.windows
+    return [(window, area) for window in windows for area in window.screen.areas if area.type == kind]
+
+
+def window_context(number: int = 0) -> dict:
+    """Window, area, region and space of a 3D viewport, for ``bpy.context.temp_override``."""
+    window, area = areas("VIEW_3D")[number]
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    return {"window": window, "area": area, "region": region, "space_data": area.spaces.active}
+
+
+def select(name: str) -> None:
+    """Make one object the only selected one, and the active one."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj.name == name)
+    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+
+
+def sessions() -> list:
+    return list(module("session").SESSIONS.alive)
+
+
+def session():
+    """The session that has the most samples."""
+    return max(sessions(), key=lambda s: s.status.samples)
+
+
+def samples() -> int:
+    return session().status.samples if sessions() else 0
+
+
+def viewports() -> list:
+    """Every viewport of Rebound's that holds something on the GPU, by its session."""
+    return [s for s in sessions() if s._gpu is not None]
+
+
+def count_draws() -> list[float]:
+    """A list that from now on gets the seconds of every draw of a viewport of Rebound's."""
+    draws: list[float] = []
+    viewport = module("viewport").Viewport
+    draw = viewport.draw
+
+    def counted(self, context, depsgraph):
+        start = time.perf_counter()
+        draw(self, context, depsgraph)
+        draws.append(time.perf_counter() - start)
+
+    viewport.draw = counted
+    return draws
+
+
+# --- eyes ------------------------------------------------------------------------------------------------------------
 
 
 def screenshot(name: str) -> None:
@@ -33,54 +108,125 @@ def screenshot(name: str) -> None:
     subprocess.run(["import", "-window", "root", f"{OUT}/{name}.png"], check=True)
 
 
-def key(name: str) -> None:
-    """A key press, as a user's."""
-    subprocess.run(["xdotool", "key", name], check=True)
-
-
-def window_context() -> dict:
-    """Window, area, region and space of the first 3D viewport, for ``bpy.context.temp_override``."""
-    window = bpy.context.window_manager.windows[0]
-    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    return {"window": window, "area": area, "region": region, "space_data": area.spaces.active}
-
-
-def viewport_picture(name: str):
-    """Screenshot of the 3D viewport's own pixels: (h, w, 3) floats, row 0 at the top."""
-    import numpy as np  # noqa: PLC0415
-
+def picture(name: str, area=None) -> np.ndarray:
+    """Screenshot of an editor's own pixels, of the first 3D viewport's where none is given: (h, w, 3), row 0 on top."""
+    area = area or window_context()["area"]
     screenshot(name)
-    area = window_context()["area"]
-    data = subprocess.run(
-        ["convert", f"{OUT}/{name}.png", "-crop", f"{area.width}x{area.height}+{area.x}+{800 - area.y - area.height}",
-         "+repage", "-depth", "8", "rgb:-"], check=True, capture_output=True).stdout  # fmt: skip
-    pixels = np.frombuffer(data, np.uint8)
-    return pixels.reshape(-1, area.width, 3) / 255
+    size = f"{area.width}x{area.height}+{area.x}+{SCREEN[1] - area.y - area.height}"
+    command = ["convert", f"{OUT}/{name}.png", "-crop", size, "+repage", "-depth", "8", "rgb:-"]
+    data = subprocess.run(command, check=True, capture_output=True).stdout
+    return np.frombuffer(data, np.uint8).reshape(-1, area.width, 3) / 255
 
 
-def wait_for(condition: Callable[[], bool], seconds: float) -> Iterator[float]:
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Mean difference of two pictures, as a part of white."""
+    return float(np.abs(a - b).mean())
+
+
+# --- hands -----------------------------------------------------------------------------------------------------------
+
+
+def xdotool(*words) -> None:
+    subprocess.run(["xdotool", *map(str, words)], check=True)
+
+
+def key(name: str) -> None:
+    """A key press, as a user's, for what is under the mouse."""
+    xdotool("key", name)
+
+
+def press_f12(samples: int) -> Steps:
+    """Begin a final render by its key, in whatever window is on top; fails where none begins."""
+    bpy.context.scene.rebound.samples = samples
+    point(middle(window_context()["area"]))
+    yield 0.5
+    xdotool("key", 96)  # its key code: by its name xdotool holds Alt down with it
+    yield from wait_for(rendering, 10)
+    if not rendering():
+        screenshot("f12_not_begun")
+        check("F12 begins a render", False)
+
+
+def point(place: Place) -> None:
+    """Move the mouse; a second, tiny move makes Blender notice the editor that it is in."""
+    x, y = place
+    xdotool("mousemove", x - 1, y, "mousemove", x, y)
+
+
+def click(place: Place, button: int = 1) -> Steps:
+    """Press and release a button of the mouse: 1 left, 2 middle, 3 right."""
+    point(place)
+    yield 0.3
+    xdotool("click", button)
+    yield 0.5
+
+
+def drag(start: Place, end: Place, button: int = 1, steps: int = 6, pause: float = 0.1) -> Steps:
+    """Move the mouse with a button held down, in steps that Blender sees one by one."""
+    point(start)
+    yield 0.3
+    xdotool("mousedown", button)
+    for step in range(1, steps + 1):
+        yield pause
+        xdotool("mousemove", *(round(a + (b - a) * step / steps) for a, b in zip(start, end, strict=True)))
+    yield pause
+    xdotool("mouseup", button)
+    yield 0.3
+
+
+def middle(area_or_region) -> Place:
+    """The middle of an area or a region on the screen."""
+    at = area_or_region
+    return at.x + at.width // 2, SCREEN[1] - at.y - at.height // 2
+
+
+# --- time ------------------------------------------------------------------------------------------------------------
+
+
+def wait_for(condition: Callable[[], bool], seconds: float) -> Steps:
     """Wait until ``condition()`` or the time is over."""
     end = time.monotonic() + seconds
     while not condition() and time.monotonic() < end:
         yield 0.1
 
 
-def run(scenario: Callable[[], Iterator[float]]) -> None:
-    """Enable Rebound and drive the scenario; quits Blender at its end."""
+def finished(seconds: float = 60) -> Steps:
+    """Wait until every viewport has the samples that it wants and keeps them; fails where that takes too long.
+
+    Between two looks Blender goes once through its main loop: notices edits, redraws, shows. A few looks are enough for
+    an edit to arrive and for the last redraw to reach the screen.
+    """
+    end, since = time.monotonic() + seconds, time.monotonic()
+    while time.monotonic() < since + 0.5:
+        yield 0.1
+        counts = [s.status.samples for s in viewports()]
+        if not counts or min(counts) < bpy.context.scene.rebound.viewport_samples:
+            since = time.monotonic()
+        if time.monotonic() > end:
+            check(f"a picture is finished within {seconds:.0f} s", False, counts)
+            return
+
+
+def rendering() -> bool:
+    return bpy.app.is_job_running("RENDER")
+
+
+def run(scenario: Callable[[], Steps]) -> None:
+    """Drive the scenario once Blender's window is there; quits Blender at its end."""
     bpy.context.preferences.view.show_splash = False
-    rebound.register()
+    bpy.context.preferences.view.use_save_prompt = False
     steps = scenario()
 
     def step():
         try:
             return next(steps)
         except StopIteration:
-            say("PASSED" if not FAILURES else f"FAILED: {FAILURES}")
+            say(f"FAILED: {FAILURES}" if FAILURES else "PASSED")
+            say("DONE")
         except Exception:  # noqa: BLE001  the end of the scenario, told in the log
             traceback.print_exc(file=sys.stdout)
         sys.stdout.flush()
         bpy.ops.wm.quit_blender()
         return None
 
-    bpy.app.timers.register(step, first_interval=2.0)
+    bpy.app.timers.register(step, first_interval=2.0, persistent=True)
