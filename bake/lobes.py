@@ -1,0 +1,111 @@
+"""Lobes around an axis (zonal harmonics): cosine, Phong, GGX; convolution with them; windows against ringing.
+
+A lobe is its n coefficients z_l of the functions with m = 0, its axis being +Z. Convolving a function with it
+multiplies band l by sqrt(4 pi / (2 l + 1)) z_l (Funk and Hecke).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .sh import band_count, band_of, evaluate
+from .sphere import Array
+
+
+def band_scales(bands: int) -> Array:
+    """(bands,) sqrt(4 pi / (2 l + 1))."""
+    return np.sqrt(4.0 * np.pi / (2.0 * np.arange(bands) + 1.0))
+
+
+def convolve(coefficients: Array, lobe: Array) -> Array:
+    """The function seen through ``lobe`` around every direction."""
+    bands = band_count(coefficients)
+    return coefficients * (band_scales(bands) * lobe[:bands])[band_of(bands)]
+
+
+def turn(lobe: Array, axes: Array) -> Array:
+    """(..., n²) coefficients of ``lobe`` around each of ``axes`` (..., 3)."""
+    bands = len(lobe)
+    return evaluate(axes, bands) * (band_scales(bands) * lobe)[band_of(bands)]
+
+
+def phong(bands: int, exponent: float) -> Array:
+    """max(0, z)^exponent, scaled to integrate to 1. ``exponent`` > 0.
+
+    The moments of the Legendre polynomials follow from one another: I_l = I_(l-2) (p - l + 2) / (p + l + 1).
+    """
+    moments = np.zeros(bands)
+    moments[0] = 1.0 / (exponent + 1.0)
+    if bands > 1:
+        moments[1] = 1.0 / (exponent + 2.0)
+    for order in range(2, bands):
+        moments[order] = moments[order - 2] * (exponent - order + 2.0) / (exponent + order + 1.0)
+    return (exponent + 1.0) * moments / band_scales(bands)
+
+
+def cosine(bands: int) -> Array:
+    """max(0, z): the lobe that turns radiance into irradiance (Ramamoorthi and Hanrahan 2001)."""
+    return np.pi * phong(bands, 1.0)
+
+
+def ggx(bands: int, roughness: float) -> Array:
+    """The lobe of a GGX mirror seen along its normal, cosine included, scaled to integrate to 1.
+
+    ``roughness`` is the square root of alpha. Where the view is oblique the true lobe is longer and leans outwards; one
+    lobe for all views is what a rotation-invariant kernel can do. Half vectors are integrated by their cumulative
+    distribution, u in 0..1, cut off where the mirrored direction dips below the surface.
+    """
+    square = max(roughness, 1e-3) ** 4
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    u = (nodes + 1.0) * (0.5 / (1.0 + square))
+    half = (1.0 - u) / (1.0 + (square - 1.0) * u)  # squared cosine of the half vector
+    z = np.clip(2.0 * half - 1.0, -1.0, 1.0)
+    weights = weights * z
+    axis = np.stack([np.sqrt(1.0 - z * z), np.zeros_like(z), z], axis=-1)
+    orders = np.arange(bands)
+    return (weights / weights.sum()) @ evaluate(axis, bands)[:, orders * (orders + 1)]
+
+
+def window(coefficients: Array, factors: Array) -> Array:
+    """Multiply each band by its factor."""
+    return coefficients * factors[band_of(band_count(coefficients))]
+
+
+def hanning(bands: int, width: float) -> Array:
+    """A raised cosine: 1 in band 0, 0 from band ``width`` on."""
+    orders = np.arange(bands)
+    return np.where(orders < width, 0.5 * (1.0 + np.cos(np.pi * orders / width)), 0.0)
+
+
+def lanczos(bands: int, width: float) -> Array:
+    """sinc: 1 in band 0, 0 from band ``width`` on. Keeps more of the middle bands, and rings more, than ``hanning``."""
+    orders = np.arange(bands)
+    return np.where(orders < width, np.sinc(orders / width), 0.0)
+
+
+def laplacian(bands: int, strength: float) -> Array:
+    """1 / (1 + strength l² (l + 1)²): the best fit that is charged for its squared Laplacian (Sloan 2008)."""
+    curvature = np.arange(bands) * (np.arange(bands) + 1.0)
+    return 1.0 / (1.0 + strength * curvature**2)
+
+
+def laplacian_strength(coefficients: Array, keep: float) -> float:
+    """The strength that leaves the fraction ``keep`` (0..1) of the squared Laplacian, summed over all leading axes.
+
+    0 where there is none to begin with: a constant function needs no window.
+    """
+    bands = band_count(coefficients)
+    power = np.bincount(band_of(bands), (coefficients.reshape(-1, bands * bands) ** 2).sum(axis=0))
+    energy = power * (np.arange(bands) * (np.arange(bands) + 1.0)) ** 2
+    if not energy.any() or keep >= 1.0:
+        return 0.0
+    low, high = 0.0, 1.0
+    while (energy * laplacian(bands, high) ** 2).sum() > keep * energy.sum():
+        low, high = high, 2.0 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if (energy * laplacian(bands, middle) ** 2).sum() > keep * energy.sum():
+            low = middle
+        else:
+            high = middle
+    return high
