@@ -1,5 +1,6 @@
 """Final renders against path-traced references: the figures that the documentation states, printed and held."""
 
+import time
 from pathlib import Path
 
 import bpy
@@ -91,6 +92,20 @@ def test_virtual_lights_match_the_path_tracer(render_shared, name, reference, bo
         level, error = show(f"{name}, direct", diffuse(truth, "Direct"), diffuse(test, "Direct"))
         assert abs(level - 1) <= largest_energy
         assert error <= largest_error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cornell_spot", "sunlit_room"])
+def test_one_bounce_is_what_a_room_lacks_most(render_shared, name):
+    """Why many are the default: what one of them costs in light, beside which all other errors are small."""
+    errors = {}
+    for bounces in ("ONE", "MANY"):
+        start = time.perf_counter()
+        truth, test = render_shared(name, "multi_bounce", samples=16, method="VPL", vpl_bounces=bounces)
+        what = f"{name}, {bounces}, {time.perf_counter() - start:.1f} s"
+        level, errors[bounces] = show(what, diffuse(truth, "Indirect"), diffuse(test, "Indirect"))
+        assert level < 0.6 if bounces == "ONE" else level > 0.9
+    assert errors["ONE"] > 10 * errors["MANY"]
 
 
 @pytest.mark.parametrize("name", ["sunlit_room", "divider", pytest.param("many_lights", marks=pytest.mark.slow)])
