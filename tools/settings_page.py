@@ -11,7 +11,7 @@ from environments import ROOT
 
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.gpu_shaders.technique import Setting, Value
-from rebound.settings import LIGHT_SETTINGS, OBJECT_SETTINGS, SETTINGS
+from rebound.settings import DISPLAY_SETTINGS, LIGHT_SETTINGS, OBJECT_SETTINGS, SETTINGS, VIEWPORT_SETTINGS
 
 PAGE = ROOT / "docs" / "manual" / "settings.md"
 HEAD = """# Every setting
@@ -28,6 +28,7 @@ def page() -> str:
         title = f"Method {technique.label}: `scene.rebound`"
         parts.append(_section(title, f"{technique.id}_", technique.settings))
     parts.append("The viewport's own value of a setting is named `viewport_` and its name.\n")
+    parts.append(_section("Viewports alone: `scene.rebound`", "viewport_", (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS)))
     parts.append(_section("Lights: `light.rebound`", "", LIGHT_SETTINGS))
     parts.append(_section("Objects: `object.rebound`", "", OBJECT_SETTINGS))
     return "\n".join(parts)

@@ -83,7 +83,7 @@ def draw_overlay() -> None:
 def _draw_split_labels(context) -> None:
     """What either side of the line shows, beside its upper end."""
     region, scale = context.region, context.preferences.system.ui_scale
-    x, y = context.scene.rebound.viewport_split_place * region.width, 0.5 * region.height + 2 * LINE * scale
+    x, y = context.scene.rebound.viewport_split_place * region.width, 0.5 * region.height + 1.5 * LINE * scale
     blf.size(0, SIZE * scale)
     _draw_text("Direct", x - blf.dimensions(0, "Direct")[0] - MARGIN * scale, y, scale)
     _draw_text("With Bounce", x + MARGIN * scale, y, scale)

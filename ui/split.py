@@ -12,11 +12,11 @@ from ..session import read_settings
 from ..settings import shown_view
 
 # Pixels at a user interface scale of 1: how near the mouse takes hold, half the line's width, the handle's half size.
-REACH, HALF_LINE, HANDLE = 8.0, 1.0, 9.0
+REACH, HALF_LINE, HANDLE = 8.0, 1.0, 16.0
 COLOR, HIGHLIGHT = (0.9, 0.9, 0.9), (1.0, 0.6, 0.1)
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1))
 # Two arrowheads that point away from the line.
-ARROWS = ((-0.25, -0.7), (-0.25, 0.7), (-1, 0), (0.25, -0.7), (1, 0), (0.25, 0.7))
+ARROWS = ((-0.4, -0.5), (-0.4, 0.5), (-1, 0), (0.4, -0.5), (1, 0), (0.4, 0.5))
 
 
 def shows_rebound(context) -> bool:
@@ -83,6 +83,8 @@ class REBOUND_GT_split_line(bpy.types.Gizmo):
         context.area.header_text_set(None)
         if cancel:
             context.scene.rebound.viewport_split_place = self.before
+        else:  # Blender makes no undo step of what a gizmo of Python's did
+            bpy.ops.ed.undo_push(message="Move Split")
 
 
 class REBOUND_GGT_split(bpy.types.GizmoGroup):

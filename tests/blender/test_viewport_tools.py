@@ -163,6 +163,17 @@ def test_view_is_drawn(view, method, shown):
         assert pixels[..., :3].max() > 0.05
 
 
+def test_view_that_fails_says_so_and_the_picture_comes_back(view, monkeypatch, caplog):
+    view.finish()
+    with monkeypatch.context() as patch:
+        patch.setattr("rebound.gpu_shaders.vpl.Vpl.view", lambda *_: 1 / 0)
+        view.scene.rebound.viewport_show = "VPL_VOXELS"
+        view.draw()
+        assert "ZeroDivisionError" in view.viewport.error and caplog.records
+    view.scene.rebound.viewport_show = "PICTURE"
+    assert view.finish()[..., :3].max() > 0.1 and not view.viewport.error
+
+
 def test_maps_are_those_of_the_active_light(view):
     other = bpy.data.objects["Spot"].copy()
     other.name = "Another"
