@@ -98,3 +98,71 @@ def test_report_with_failures_is_counted(tool, tmp_path):
 def test_process_that_died_counts_as_a_failure(tool, tmp_path):
     run_tests = tool("run_tests")
     assert run_tests._read(tmp_path / "none.xml", -11, 2.0).failed == 1
+
+
+LOG = """>> ok   one thing
+>> ok   another (with a Traceback in its text)
+>> DONE
+"""
+
+
+def test_window_log_counts_checks(tool):
+    outcome = tool("test_window").read_log(LOG, 0, 3.0)
+    assert (outcome.passed, outcome.failed, outcome.note) == (2, 0, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "note"),
+    [
+        (LOG + ">> FAIL a third", 0, ""),
+        (LOG.replace(">> DONE\n", ""), 0, "the scenario did not come to its end"),
+        (LOG, 124, "killed after 3 s"),
+        (LOG, 139, "Blender ended with status 139"),
+        (LOG + "Traceback (most recent call last):", 0, "1 tracebacks, 0 announced"),
+        (LOG + ">> a traceback is expected", 0, "0 tracebacks, 1 announced"),
+    ],
+)
+def test_window_log_with_anything_wrong_has_failed(tool, text, status, note):
+    outcome = tool("test_window").read_log(text, status, 3.0)
+    assert (outcome.failed, outcome.note) == (1, note)
+
+
+def test_process_that_hangs_is_killed_with_its_children(tool, tmp_path):
+    window = tool("test_window")
+    started = tmp_path / "started"
+    command = ["sh", "-c", f"trap '' TERM; sleep 60 & echo $! > {started}; wait"]
+    with window._running(command, dict(os.environ), subprocess.DEVNULL) as process:
+        while not (started.exists() and started.read_text()):
+            assert process.poll() is None
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.1)
+    child = int(started.read_text())
+    stat = Path(f"/proc/{child}/stat")
+    assert not stat.exists() or stat.read_text().split()[2] == "Z"
+
+
+def test_machine_without_a_window_says_why(tool, monkeypatch):
+    tree = tool("window_tree")
+    monkeypatch.setattr(tree, "_is_complete_here", lambda: False)
+    monkeypatch.setattr(tree, "_is_made", lambda _tree: False)
+    monkeypatch.setattr(tree.os, "geteuid", lambda: 1000)
+    with pytest.raises(tree.Unavailable, match="only root"):
+        tree.find_place()
+
+
+def test_machine_without_a_window_skips(tool, monkeypatch, capsys):
+    window = tool("test_window")
+
+    def unavailable():
+        raise window.Unavailable("no network")
+
+    monkeypatch.setattr(window, "find_place", unavailable)
+    monkeypatch.setattr(sys, "argv", ["test_window.py"])
+    assert window.main() == 0
+    assert capsys.readouterr().out == "test-window: skipped: no network\n"
+
+
+def test_every_default_scenario_is_there(tool):
+    window = tool("test_window")
+    names = {name for scenarios in window.DEFAULT.values() for name in scenarios}
+    assert all((window.SCENARIOS / f"{name}.py").exists() for name in names)

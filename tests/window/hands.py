@@ -44,7 +44,7 @@ class WINDOW_PT_slider(bpy.types.Panel):  # noqa: N801  Blender's way
 
 def scenario():
     draws = count_draws()
-    bpy.context.scene.rebound.viewport_samples = 8
+    bpy.context.scene.rebound.viewport_samples = 4
     bpy.data.objects["Light"].data.energy = 3000
     bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1))
     with bpy.context.temp_override(**window_context()):
@@ -72,10 +72,14 @@ def choose_engine():
     yield 1.0
     region = next(r for r in area.regions if r.type == "WINDOW")
     x, y = region.x + int(region.width * 0.7), 800 - region.y - region.height + 52
-    yield from click((x, y))
-    screenshot("engine_menu")
-    key("r")  # the underlined letter of Rebound
-    yield 1.0
+    for _ in range(3):  # a machine that is busy with other things misses clicks
+        yield from click((x, y))
+        yield 1.0
+        screenshot("engine_menu")
+        key("r")  # the underlined letter of Rebound
+        yield 1.0
+        if scene.render.engine == "REBOUND":
+            break
     check("the engine is chosen from the menu", scene.render.engine == "REBOUND", scene.render.engine)
     scene.render.engine = "REBOUND"
 
@@ -93,7 +97,7 @@ def choose_rendered():
     check("Rendered is chosen by key", shading.type == "RENDERED", shading.type)
     shading.type = "RENDERED"
     yield from finished(90)
-    check("the first picture is there", samples() == 8)
+    check("the first picture is there", samples() == 4)
     hover()
     key("shift+z")
     yield from wait_for(lambda: not viewports(), 5)
@@ -148,7 +152,12 @@ def slider():
     check("Esc takes a drag back", dragged > value + 0.1 and strength.default_value == value, dragged)
     check("in the picture too", difference(picture("slider_escaped"), brighter) < SAME)
     strength.default_value = 0.2
-    window_context()["space_data"].show_region_ui = False
+    space = window_context()["space_data"]
+    space.show_region_ui = False
+    # Of a sky hundreds of times as bright a few samples remember more than a few per cent.
+    space.shading.type = "SOLID"
+    yield 1.0
+    space.shading.type = "RENDERED"
     bpy.utils.unregister_class(WINDOW_PT_slider)
     yield 1.0
 

@@ -23,6 +23,7 @@ PACKAGE = "bl_ext.user_default.rebound"
 OUT = os.environ["WINDOW_OUT"]
 SCREEN = (1280, 800)
 FAILURES: list[str] = []
+STARTED = time.monotonic()
 
 Place = tuple[int, int]
 Steps = Iterator[float]
@@ -39,7 +40,7 @@ def say(*words) -> None:
 
 
 def check(what: str, passed, *details) -> None:
-    say("ok  " if passed else "FAIL", what, *details)
+    say("ok  " if passed else "FAIL", what, *details, f"[{time.monotonic() - STARTED:.0f} s]")
     if not passed:
         FAILURES.append(what)
 

@@ -24,7 +24,6 @@ from steps import (
 
 # Of the pixels in either of two silhouettes, the part that is in both; edges are smooth in one and hard in the other.
 SAME = 0.94
-OFF = 0.35  # pixels between the middles of both
 HALF = 0.735  # what a pixel shows that a white object covers half
 
 
@@ -83,9 +82,10 @@ def in_place(what: str, number: int = 0):
     rendered = picture(name, context["area"])
     masks = bright(rendered), bright(solid)
     same = overlap(*masks)
-    off = np.subtract(*(np.argwhere(mask).mean(axis=0) for mask in masks))
-    good = same > SAME and np.abs(off).max() < OFF and masks[1].mean() > 0.005
-    check(f"{what}: in its place", good, round(same, 4), "pixels off:", *np.round(off, 2))
+    # Half a pixel off, and a shift by a whole one would not be worse.
+    shifted = [overlap(np.roll(masks[0], step, axis), masks[1]) for axis in (0, 1) for step in (-1, 1)]
+    good = same > SAME and same > max(shifted) and masks[1].mean() > 0.005
+    check(f"{what}: in its place", good, round(same, 4), "shifted by a pixel:", *np.round(shifted, 4))
     return rendered
 
 
