@@ -11,6 +11,7 @@ import bpy
 
 from ..engine import boundary
 from ..gpu_shaders import TECHNIQUES
+from ..gpu_shaders.frame.map_views import STRIP, THUMBNAIL_PART
 from ..session import SESSIONS, Status, read_settings
 from ..settings import Settings, shown_view
 from .panels import shown_label
@@ -30,8 +31,8 @@ def statistics_lines(status: Status) -> Iterator[str]:
         yield f"Sample  {1e3 * sum(status.seconds.values()):.1f} ms"
         yield from (f"    {name}  {1e3 * seconds:.1f} ms" for name, seconds in status.seconds.items())
     counts = status.statistics
-    lights = [f"{counts.get('lights', 0):,.0f} lights", *_maps(counts, status.redrawn)]
-    yield ", ".join(lights)
+    lights = counts.get("lights", 0)
+    yield ", ".join([f"{lights:,.0f} light{'s' * (lights != 1)}", *_maps(counts, status.redrawn)])
     if counts.get("virtual_lights"):
         yield f"{counts['virtual_lights']:,.0f} virtual lights of {counts['light_texels']:,.0f}"
     yield f"{counts.get('triangles', 0):,.0f} triangles"
@@ -75,9 +76,9 @@ def draw_overlay() -> None:
     if status and not status.error and shows_split(context):
         _draw_split_labels(context)
     scale = context.preferences.system.ui_scale
-    left = _left(context) + MARGIN * scale
+    left, bottom = _left(context) + MARGIN * scale, _bottom(context) + MARGIN * scale
     for number, line in enumerate(reversed(lines)):
-        _draw_text(line, left, (MARGIN + number * LINE) * scale, scale)
+        _draw_text(line, left, bottom + number * LINE * scale, scale)
 
 
 def _draw_split_labels(context) -> None:
@@ -105,6 +106,13 @@ def _left(context) -> float:
         return 0.0
     widths = [r.width for r in context.area.regions if r.type == "TOOLS" and r.alignment == "LEFT" and r.width > 1]
     return float(max(widths, default=0))
+
+
+def _bottom(context) -> float:
+    """How many pixels at the bottom of the region a strip of thumbnails takes."""
+    view = shown_view(read_settings(context.scene, viewport=True))
+    is_strip = view is not None and view.key.endswith(STRIP)
+    return THUMBNAIL_PART * context.region.height if is_strip else 0.0
 
 
 class _Handler:

@@ -39,12 +39,15 @@ MAP_VIEW = Shader(
 
 # Thumbnails take at most such a part of the picture's height, with so many pixels between them.
 THUMBNAIL_PART, GAP = 0.25, 4
+STRIP = "_MAPS"  # how the key of the strip ends
 
 
 def map_views(owner: str) -> tuple[DebugView, ...]:
     """The views of a technique that has such maps; ``owner`` is its id in capitals."""
     together = "; ".join(f"{label}: {colors}" for label, colors in _PARTS.values())
-    strip = DebugView(f"{owner}_MAPS", "Light Maps", f"Maps {_WHOSE}, below the picture. {together}", over_picture=True)
+    strip = DebugView(
+        f"{owner}{STRIP}", "Light Maps", f"Maps {_WHOSE}, below the picture. {together}", over_picture=True
+    )
     full = [
         DebugView(f"{owner}_MAP_{part}", f"Light Map: {label}", f"Maps {_WHOSE}: {colors}")
         for part, (label, colors) in _PARTS.items()
@@ -64,8 +67,9 @@ def draw_maps(
         _draw_part(device, part, maps, gpu_scene, tiles, ((width - side) // 2, (height - side) // 2, side), target)
         return
     side = max(min(int(height * THUMBNAIL_PART), width // len(_PARTS) - GAP), 1)
+    first = max((width - len(_PARTS) * (side + GAP)) // 2, 0)
     for number, part in enumerate(_PARTS):
-        left = GAP + number * (side + GAP)
+        left = first + number * (side + GAP)
         if left + side <= width:
             _draw_part(device, part, maps, gpu_scene, tiles, (left, min(GAP, height - side), side), target)
 
@@ -79,15 +83,16 @@ def _draw_part(
     square: tuple[int, int, int],
     target: Target,
 ) -> None:
-    """One part of all of a light's faces, in the square of pixels (left, bottom, side)."""
+    """One part of all of a light's faces, row by row from the bottom of the square of pixels (left, bottom, side)."""
     columns = math.ceil(math.sqrt(len(tiles)))
+    rows = -(-len(tiles) // max(columns, 1))
     left, bottom, side = square
     low, high = gpu_scene.boxes[:, 0].min(0), gpu_scene.boxes[:, 1].max(0)
     for place, tile in enumerate(tiles):
         row, column = divmod(place, columns)
         step = max(side // columns, 1)
-        viewport: Viewport = (left + column * step, bottom + side - (row + 1) * step, step, step)
-        if viewport[1] < 0:  # fewer pixels than faces
+        viewport: Viewport = (left + column * step, bottom + (rows - 1 - row) * step, step, step)
+        if viewport[0] + step > target.size[0] or viewport[1] + step > target.size[1]:  # fewer pixels than faces
             continue
         device.fullscreen(
             MAP_VIEW,

@@ -215,7 +215,7 @@ def test_statistics_tell_times_only_while_they_are_shown(view):
     assert {"surfaces", "direct light", "gather", "sum"} <= status.seconds.keys()
     assert SESSIONS.status_of(view.context.region.as_pointer()) is status
     text = "\n".join(overlay.overlay_lines(view.scene, status))
-    for word in ("ms", "1 lights", "1 shadow maps (0 redrawn", "virtual lights of", "triangles", "MiB"):
+    for word in ("ms", "1 light, ", "1 shadow maps (0 redrawn", "virtual lights of", "triangles", "MiB"):
         assert word in text, text
     view.scene.rebound.viewport_stats = False
     assert not overlay.overlay_lines(view.scene, status)

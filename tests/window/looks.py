@@ -94,12 +94,17 @@ def split(whole):
     part = np.abs(half - whole).max(axis=-1)[80:]
     left, right = (float(side.mean()) for side in np.array_split(part, 2, axis=1))
     check("the left side lacks bounced light, the right is whole", left > 5 * right, round(left, 4), round(right, 4))
+    bpy.ops.ed.undo_push(message="Split")
     x, y = middle(region)
     yield from drag((x, y), (x + region.width // 5, y), steps=8)
     place = group.viewport_split_place
     check("the line follows the mouse", 0.6 < place < 0.8, round(place, 3))
     yield from finished()
     screenshot("split_dragged")
+    bpy.ops.ed.undo()
+    yield from finished()
+    group = bpy.context.scene.rebound
+    check("undo puts the line back, and no more", group.viewport_split and abs(group.viewport_split_place - 0.5) < 0.01)
     group.viewport_split = False
     yield from finished()
     check("without split it is whole again", difference(picture("split_off"), whole) < SAME)
