@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from .surfaces import Surfaces
 
 # Pairs of a vertex and a direction looked at in one piece: some tens of MB, and a fraction of a second by Embree.
 _PIECE = 262144
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ def diffuse(
     return total
 
 
-def finish(bake: Generator[Progress, None, Array]) -> Array:
+def finish(bake: Generator[Progress, None, Result]) -> Result:
     """Run a bake to its end and return what it found."""
     while True:
         try:
