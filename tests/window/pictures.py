@@ -1,7 +1,6 @@
 """Pictures of the interface for the manual: no test, but `tools/test_window.py pictures --copy-to docs/manual/images`.
 
-The scene is examples/cornell_box.blend, or the file that REBOUND_SCENE names. Pictures carry nothing but pixels, in at
-most 256 colours, which is enough for an interface and a quarter of the size.
+The scene is examples/cornell_box.blend, or the file that REBOUND_SCENE names. Pictures carry nothing but pixels.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from pathlib import Path
 import bpy
 from steps import OUT, SCREEN, areas, check, finished, run, select, window_context
 
-SCALE = 1.0
 TABS = {"render": "RENDER", "light": "DATA", "object": "OBJECT", "view_layer": "VIEW_LAYER"}
 
 
@@ -20,7 +18,7 @@ def shot(name: str, box: tuple[int, int, int, int] = (0, 0, *SCREEN)) -> None:
     """A part of the screen, (left, top, width, height), as a small PNG without any text in it."""
     left, top, width, height = box
     subprocess.run(["import", "-window", "root", "-crop", f"{width}x{height}+{left}+{top}", "+repage", "-strip",
-                    "-dither", "None", "-colors", "256", "-define", "png:compression-level=9",
+                    "-define", "png:compression-level=9", "-define", "png:compression-filter=5",
                     "-define", "png:exclude-chunks=date,time,gAMA,cHRM", f"{OUT}/{name}.png"], check=True)  # fmt: skip
 
 
@@ -43,7 +41,9 @@ def scenario():
         with bpy.context.temp_override(**context):
             bpy.ops.view3d.view_camera()
     yield 1.0
-    space.region_3d.view_camera_zoom = 30
+    space.region_3d.view_camera_zoom = 8
+    scene.camera.data.passepartout_alpha = 1.0
+    scene.rebound.viewport_samples = 12
     space.shading.type = "RENDERED"
     areas("PROPERTIES")[0][1].spaces.active.context = "RENDER"
     yield from finished(180)
