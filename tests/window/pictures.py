@@ -42,7 +42,7 @@ def scenario():
             bpy.ops.view3d.view_camera()
     yield 1.0
     space.region_3d.view_camera_zoom = 8
-    scene.camera.data.passepartout_alpha = 1.0
+    scene.camera.data.show_passepartout = False  # it would hide what views draw beside the frame
     scene.rebound.viewport_samples = 12
     space.shading.type = "RENDERED"
     areas("PROPERTIES")[0][1].spaces.active.context = "RENDER"
