@@ -59,14 +59,14 @@ def active_output(tree):
 def source(socket: Socket) -> Socket:
     """Follow a link back to the output that really makes the value, or the unlinked input that holds its constant."""
     for _ in range(MAX_STEPS):
-        back = _step(socket)
+        back = step_back(socket)
         if back is None:
             return socket
         socket = back
     return socket
 
 
-def _step(at: Socket) -> Socket | None:
+def step_back(at: Socket) -> Socket | None:
     """One step back from an input along its link, or from an output into what it stands for; None at the end."""
     if not at.socket.is_output:
         for link in at.socket.links:

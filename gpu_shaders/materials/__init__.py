@@ -1,0 +1,9 @@
+"""Material node graphs -> GLSL: one function a graph, its numbers in a table, for every pass that meets a surface."""
+
+from __future__ import annotations
+
+from .code import Attribute
+from .generator import MaterialShader, generate
+from .node_code import is_supported, supported_kinds
+
+__all__ = ["Attribute", "MaterialShader", "generate", "is_supported", "supported_kinds"]

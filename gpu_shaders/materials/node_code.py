@@ -1,0 +1,173 @@
+"""The GLSL of each kind of node: an expression for each output, with its inputs and options in braces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...scene.node_graph import Node
+from . import texture_code, value_code
+from .code import Attribute, Code
+
+
+def is_supported(kind: str) -> bool:
+    """Whether a node of this Blender type can be expressed."""
+    return kind in _CODE
+
+
+def supported_kinds() -> tuple[str, ...]:
+    """Every kind that can be, in the order of the table."""
+    return tuple(_CODE)
+
+
+def code_of(node: Node) -> Code:
+    """The code of a supported node; KeyError for another."""
+    code = _CODE[node.kind]
+    return code if isinstance(code, Code) else code(node)
+
+
+# --- Places ----------------------------------------------------------------------------------------------------------
+
+_COORDINATES = Code(
+    {
+        "Generated": "point.generated", "Normal": "point.object_normal", "UV": "vec3(point.uv, 0.0)",
+        "Object": "point.object_position", "Camera": "point.camera_position", "Window": "point.window",
+        "Reflection": "-reflect(point.incoming, point.normal)",
+    }
+)  # fmt: skip
+_GEOMETRY = Code(
+    {
+        "Position": "point.position", "Normal": "point.normal", "Tangent": "point.tangent",
+        "True Normal": "point.geometric_normal", "Incoming": "point.incoming", "Backfacing": "point.backfacing",
+    }
+)  # fmt: skip
+_OBJECT = Code(
+    {
+        "Location": "point.object_location", "Color": "point.object_color.rgb", "Alpha": "point.object_color.a",
+        "Object Index": "point.object_index", "Material Index": "point.material_index",
+        "Random": "point.object_random",
+    }
+)  # fmt: skip
+_LIGHT_PATH = Code({"Is Camera Ray": "point.camera_ray"})
+
+
+def _uv_map(node: Node) -> Code:
+    return Code({"UV": "vec3({map}, 0.0)"}, attributes={"map": Attribute("uv", str(node.option("uv_map")))})
+
+
+def _color_attribute(node: Node) -> Code:
+    named = Attribute("color", str(node.option("layer_name")))
+    return Code({"Color": "{named}.rgb", "Alpha": "{named}.a"}, attributes={"named": named})
+
+
+def _attribute(node: Node) -> Code:
+    named = Attribute("color", str(node.option("attribute_name")))
+    outputs = {
+        "Color": "{named}.rgb",
+        "Vector": "{named}.rgb",
+        "Alpha": "{named}.a",
+        "Fac": "dot({named}.rgb, vec3(1.0 / 3.0))",
+    }
+    return Code(outputs, attributes={"named": named})
+
+
+# --- Shaders ---------------------------------------------------------------------------------------------------------
+
+_PRINCIPLED = Code(
+    {
+        "BSDF": "surface_over(surface_principled(SurfacePrincipled({Base Color}, {Metallic}, {Roughness}, {IOR}, "
+        "{Specular IOR Level}, {Specular Tint}, {Transmission Weight}, {Alpha}), {Normal}), {Alpha}, "
+        "{Emission Color} * {Emission Strength}, {Sheen Tint} * {Sheen Weight}, {Coat Weight}, {Coat IOR}, "
+        "{Coat Roughness})"
+    },
+    ("surface",),
+)
+
+
+def _metallic(node: Node) -> Code:
+    conductor = node.option("fresnel_type") == "PHYSICAL_CONDUCTOR"
+    color = "surface_conductor({IOR}, {Extinction})" if conductor else "{Base Color}"
+    return Code({"BSDF": f"surface_metal({color}, {{Roughness}}, {{Normal}})"}, ("surface",))
+
+
+_DIFFUSE = Code({"BSDF": "surface_diffuse({Color}, {Normal})"}, ("surface",))
+
+_CODE: dict[str, Code | Callable[[Node], Code]] = {
+    "ShaderNodeBsdfPrincipled": _PRINCIPLED,
+    "ShaderNodeBsdfDiffuse": _DIFFUSE,
+    "ShaderNodeSubsurfaceScattering": Code({"BSSRDF": "surface_diffuse({Color}, {Normal})"}, ("surface",)),
+    "ShaderNodeBsdfAnisotropic": Code({"BSDF": "surface_glossy({Color}, {Roughness}, {Normal})"}, ("surface",)),
+    "ShaderNodeBsdfMetallic": _metallic,
+    "ShaderNodeBsdfGlass": Code({"BSDF": "surface_glass({Color}, {Roughness}, {IOR}, {Normal})"}, ("surface",)),
+    "ShaderNodeBsdfRefraction": Code(
+        {"BSDF": "surface_refraction({Color}, {Roughness}, {IOR}, {Normal})"}, ("surface",)
+    ),
+    "ShaderNodeBsdfTransparent": Code({"BSDF": "surface_transparent({Color}, point.normal)"}, ("surface",)),
+    "ShaderNodeEmission": Code({"Emission": "surface_emission({Color}, {Strength}, point.normal)"}, ("surface",)),
+    "ShaderNodeMixShader": Code({"Shader": "surface_mix({Shader}, {Shader_001}, {Fac})"}, ("surface",)),
+    "ShaderNodeAddShader": Code({"Shader": "surface_add({Shader}, {Shader_001})"}, ("surface",)),
+    "ShaderNodeTexNoise": texture_code.noise,
+    "ShaderNodeTexVoronoi": texture_code.voronoi,
+    "ShaderNodeTexWhiteNoise": texture_code.white_noise,
+    "ShaderNodeTexWave": texture_code.wave,
+    "ShaderNodeTexGradient": Code(
+        {
+            "Color": "vec3(clamp(pattern_gradient_{gradient_type}({Vector}), 0.0, 1.0))",
+            "Fac": "clamp(pattern_gradient_{gradient_type}({Vector}), 0.0, 1.0)",
+        },
+        ("pattern",),
+    ),
+    "ShaderNodeTexChecker": Code(
+        {"Color": "mix({Color2}, {Color1}, {v}_k)", "Fac": "{v}_k"},
+        ("pattern",),
+        "float {v}_k = pattern_checker({Vector}, {Scale});",
+    ),
+    "ShaderNodeTexBrick": texture_code.BRICK,
+    "ShaderNodeTexMagic": Code(
+        {"Color": "{v}_m", "Fac": "dot({v}_m, vec3(1.0 / 3.0))"},
+        ("pattern",),
+        "vec3 {v}_m = pattern_magic({Vector} * {Scale}, int({turbulence_depth}), {Distortion});",
+    ),
+    "ShaderNodeValToRGB": value_code.RAMP,
+    "ShaderNodeRGBCurve": value_code.curves("Color"),
+    "ShaderNodeVectorCurve": value_code.curves("Vector"),
+    "ShaderNodeFloatCurve": value_code.FLOAT_CURVE,
+    "ShaderNodeMath": value_code.math,
+    "ShaderNodeVectorMath": value_code.vector_math,
+    "ShaderNodeMapRange": value_code.map_range,
+    "ShaderNodeClamp": value_code.clamp,
+    "ShaderNodeMapping": value_code.mapping,
+    "ShaderNodeVectorRotate": value_code.vector_rotate,
+    "ShaderNodeMix": value_code.mix,
+    "ShaderNodeMixRGB": value_code.mix_rgb,
+    "ShaderNodeInvert": Code({"Color": "mix({Color}, 1.0 - {Color}, {Fac})"}),
+    "ShaderNodeGamma": Code({"Color": "color_gamma({Color}, {Gamma})"}, ("color",)),
+    "ShaderNodeHueSaturation": Code(
+        {"Color": "color_adjust_hsv({Color}, {Hue}, {Saturation}, {Value}, {Fac})"}, ("color",)
+    ),
+    "ShaderNodeBrightContrast": Code({"Color": "color_bright_contrast({Color}, {Bright}, {Contrast})"}, ("color",)),
+    "ShaderNodeRGBToBW": Code({"Val": "color_gray({Color})"}, ("color",)),
+    "ShaderNodeSeparateColor": value_code.separate,
+    "ShaderNodeCombineColor": value_code.combine,
+    "ShaderNodeSeparateXYZ": Code({"X": "{Vector}.x", "Y": "{Vector}.y", "Z": "{Vector}.z"}),
+    "ShaderNodeCombineXYZ": Code({"Vector": "vec3({X}, {Y}, {Z})"}),
+    "ShaderNodeSeparateRGB": Code({"R": "{Image}.x", "G": "{Image}.y", "B": "{Image}.z"}),
+    "ShaderNodeCombineRGB": Code({"Image": "vec3({R}, {G}, {B})"}),
+    "ShaderNodeFresnel": Code({"Fac": "fresnel_node({IOR}, {Normal}, point.incoming, point.backfacing)"}, ("fresnel",)),
+    "ShaderNodeLayerWeight": Code(
+        {
+            "Fresnel": "fresnel_weight({Blend}, {Normal}, point.incoming, point.backfacing)",
+            "Facing": "fresnel_facing({Blend}, {Normal}, point.incoming)",
+        },
+        ("fresnel",),
+    ),
+    "ShaderNodeTexCoord": _COORDINATES,
+    "ShaderNodeNewGeometry": _GEOMETRY,
+    "ShaderNodeObjectInfo": _OBJECT,
+    "ShaderNodeLightPath": _LIGHT_PATH,
+    "ShaderNodeUVMap": _uv_map,
+    "ShaderNodeVertexColor": _color_attribute,
+    "ShaderNodeAttribute": _attribute,
+    # The reader's own.
+    "Number": Code({"Value": "{Value}"}),
+    "Plain": Code({"Color": "{Color}", "Alpha": "{Alpha}"}),
+}
