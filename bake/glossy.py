@@ -17,7 +17,7 @@ from . import lobes, sh
 from .occlusion import Caster
 from .sphere import Array, quadrature, spread
 from .surfaces import Surfaces
-from .transfer import Blocked, Progress, Sampling, diffuse, pieces, reflected, trace
+from .transfer import Blocked, Progress, Sampling, diffuse, pieces, reflected, scaled, trace
 
 
 def hemisphere(bands: int) -> Array:
@@ -55,7 +55,7 @@ def glossy(
     lit = None
     if sampling.bounces:
         one_less = Sampling(sampling.bands, sampling.directions, True, sampling.bounces - 1)
-        lit = yield from _scaled(diffuse(surfaces, caster, one_less), 0.0, 0.5)
+        lit = yield from scaled(diffuse(surfaces, caster, one_less), 0.0, 0.5)
     directions = spread(sampling.directions)
     weight = 4.0 * np.pi / sampling.directions
     out, back = sh.evaluate(directions, result), sh.evaluate(directions, sampling.bands)
@@ -87,16 +87,6 @@ def _bounced(surfaces: Surfaces, blocked: Blocked, lit: Array, out: Array, rows:
         rays = slice(first, last)
         total[row] = np.tensordot(out[blocked.directions[rays]], light[rays], axes=(0, 0)).transpose(1, 0, 2)
     return total
-
-
-def _scaled(bake: Generator[Progress, None, Array], start: float, part: float) -> Generator[Progress, None, Array]:
-    """A bake that is a part of another one."""
-    while True:
-        try:
-            step = next(bake)
-        except StopIteration as end:
-            return end.value
-        yield Progress(start + part * step.part, step.doing)
 
 
 def turn_matrices(matrices: Array, frame: Array) -> Array:

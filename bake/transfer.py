@@ -159,6 +159,16 @@ def diffuse(
     return total
 
 
+def scaled(work: Generator[Progress, None, Result], start: float, part: float) -> Generator[Progress, None, Result]:
+    """A piece of work that is a part of a longer one."""
+    while True:
+        try:
+            step = next(work)
+        except StopIteration as end:
+            return end.value
+        yield Progress(start + part * step.part, step.doing)
+
+
 def finish(bake: Generator[Progress, None, Result]) -> Result:
     """Run a bake to its end and return what it found."""
     while True:

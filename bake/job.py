@@ -1,0 +1,197 @@
+"""One bake of some objects of a scene, from its settings to what their files hold; and whether a file still fits."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Generator, Hashable, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from ..scene.data import Array, Instance, Scene, Visibility
+from . import sh
+from .compress import Compressed, compress
+from .file import Bake
+from .glossy import glossy, turn_matrices
+from .haar import SparseRows
+from .occlusion import Caster, make_caster
+from .surfaces import Surfaces, frame_of, gather, mesh_fingerprint
+from .transfer import Progress, Sampling, diffuse, scaled
+from .wavelets import wavelet
+
+
+class Kind(Enum):
+    """What is baked."""
+
+    DIFFUSE = "DIFFUSE"  # a vector a vertex: soft light on matt surfaces
+    GLOSSY = "GLOSSY"  # a matrix a vertex: soft light on shiny surfaces
+    WAVELET = "WAVELET"  # a sparse row a vertex: light with sharp edges on matt surfaces
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """What a bake costs and how good it is. Kinds leave alone what is not theirs."""
+
+    kind: Kind = Kind.DIFFUSE
+    bands: int = 5  # DIFFUSE 1..11, GLOSSY with result_bands 12 together: the light's detail
+    result_bands: int = 5  # GLOSSY: detail of what arrives
+    directions: int = 1024  # DIFFUSE, GLOSSY: rays a vertex, over the whole sphere
+    shadows: bool = True
+    bounces: int = 2  # DIFFUSE, GLOSSY
+    error: float = 0.01  # GLOSSY: root mean square error of the compression, of the matrices' length
+    texels: int = 32  # WAVELET: a power of two, up to 64; along a side of a face of the light's cube map
+    keep: float = 0.999  # WAVELET: the part of each row's energy that is kept
+    rays: str = ""  # "embree", "numpy", or "" for the better one there is
+
+    def __post_init__(self) -> None:
+        """Raises ValueError naming the setting that is out of its limits."""
+        limits: dict[str, tuple[float, float]] = {"bands": (1, sh.MAX_BANDS), "directions": (16, 65536)}
+        limits |= {"bounces": (0, 64), "error": (0, 1), "keep": (0, 1), "texels": (1, 64), "result_bands": (1, 11)}
+        for name, (low, high) in limits.items():
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} is {getattr(self, name)}: it can be {low} to {high}")
+        if self.texels & (self.texels - 1):
+            raise ValueError(f"texels is {self.texels}: it can be 1, 2, 4, 8, 16, 32 or 64")
+        if self.kind is Kind.GLOSSY and self.bands + self.result_bands > sh.MAX_BANDS + 1:
+            raise ValueError(f"bands and result_bands together are more than {sh.MAX_BANDS + 1}")
+
+
+def surroundings_fingerprint(scene: Scene, key: Hashable) -> str:
+    """Hexadecimal SHA-256 of all that a bake of ``key`` depends on beside its own mesh: who stands where, how coloured.
+
+    Seen from the object: moving it and all others together rigidly changes nothing to speak of (5 digits are kept).
+    """
+    own = next(i for i in scene.instances if i.key == key)
+    home = np.eye(4)
+    home[:3, :3], home[:3, 3] = frame_of(own.world_from_object), own.world_from_object[:3, 3]
+    lines, shapes = [], {}
+    for other in scene.instances:
+        if other.key == key or other.visibility & Visibility.SHADOW:
+            place = np.linalg.inv(home) @ other.world_from_object
+            colours = [scene.materials[m] for m in other.materials]
+            look = [(c.base_color, str(c.base_color_texture), c.metallic, c.specular, c.layered) for c in colours]
+            flags = int(other.visibility & (Visibility.SHADOW | Visibility.BOUNCE))
+            if other.mesh not in shapes:  # one mesh may stand in 50,000 places
+                shapes[other.mesh] = mesh_fingerprint(scene.meshes[other.mesh])
+            who = f"{shapes[other.mesh]} {other.key == key}"
+            lines.append(f"{who} {(np.round(place, 5) + 0.0).tolist()} {look} {flags}")
+    return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
+
+
+def unfit(about: Any, scene: Scene, key: Hashable) -> str:
+    """Why the bake that ``about`` tells of is not one of this object as it stands; "" where it is. One line."""
+    instance = next((i for i in scene.instances if i.key == key), None)
+    if instance is None:
+        return "the object is no longer there"
+    if about.get("fingerprint") != mesh_fingerprint(scene.meshes[instance.mesh]):
+        return "the mesh has changed since it was baked: bake again"
+    if about.get("surroundings") != surroundings_fingerprint(scene, key):
+        return "what stands around the object, or a colour, has changed since it was baked: bake again"
+    return ""
+
+
+def bake_objects(
+    scene: Scene, keys: Sequence[Hashable], settings: BakeSettings
+) -> Generator[Progress, None, dict[Hashable, Bake]]:
+    """What the files of the objects ``keys`` hold. Closing the generator ends the bake.
+
+    The bounces of all are found together. Raises ValueError for a key that is not in the scene.
+    """
+    by_key = {i.key: i for i in scene.instances}
+    missing = [key for key in keys if key not in by_key]
+    if missing:
+        raise ValueError(f"the scene has no object {missing[0]!r}")
+    surfaces = gather(scene, frozenset(keys))
+    caster = make_caster(surfaces.corners[surfaces.blocks], settings.rays)
+    yield Progress(0.0, f"rays by {caster.name}")
+    instances = [by_key[key] for key in keys]
+    if settings.kind is Kind.DIFFUSE:
+        found = yield from _diffuse(surfaces, caster, instances, settings)
+    else:
+        found = yield from _one_by_one(surfaces, caster, instances, settings)
+    return {key: Bake(_about(scene, key, settings) | more, arrays) for key, (more, arrays) in found.items()}
+
+
+Found = dict[Hashable, tuple[dict[str, Any], dict[str, Array]]]
+
+
+def _about(scene: Scene, key: Hashable, settings: BakeSettings) -> dict[str, Any]:
+    plain = asdict(settings) | {"kind": settings.kind.value}
+    mesh = scene.meshes[next(i for i in scene.instances if i.key == key).mesh]
+    about = {"kind": plain["kind"], "object": str(key), "fingerprint": mesh_fingerprint(mesh)}
+    return about | {"surroundings": surroundings_fingerprint(scene, key), "settings": plain}
+
+
+def _sampling(settings: BakeSettings) -> Sampling:
+    return Sampling(settings.bands, settings.directions, settings.shadows, settings.bounces)
+
+
+def _rows(surfaces: Surfaces, instance: Instance) -> Array:
+    run = surfaces.runs[instance.key]
+    return np.arange(run.start, run.stop)
+
+
+def _diffuse(
+    surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
+) -> Generator[Progress, None, Found]:
+    rows = np.sort(np.concatenate([_rows(surfaces, instance) for instance in instances]))
+    transfer = yield from diffuse(surfaces, caster, _sampling(settings), rows)
+    turned = ((i, sh.rotate(transfer[surfaces.runs[i.key]], frame_of(i.world_from_object).T)) for i in instances)
+    return {instance.key: ({}, {"diffuse": vectors.astype(np.float16)}) for instance, vectors in turned}
+
+
+def _one_by_one(
+    surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
+) -> Generator[Progress, None, Found]:
+    found: Found = {}
+    for number, instance in enumerate(instances):
+        of_one = _glossy if settings.kind is Kind.GLOSSY else _wavelet
+        work = of_one(surfaces, caster, instance, settings)
+        found[instance.key] = yield from scaled(work, number / len(instances), 1.0 / len(instances))
+    return found
+
+
+def _glossy(
+    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings
+) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
+    rows = _rows(surfaces, instance)
+    bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows)
+    matrices = yield from scaled(bake, 0.0, 0.8)
+    matrices = turn_matrices(matrices, frame_of(instance.world_from_object))
+    packed = yield from scaled(compress(matrices.reshape(len(rows), -1), settings.error), 0.8, 0.2)
+    more = {"matrix": list(matrices.shape[1:]), "rms": packed.rms, "worst": packed.worst}
+    arrays = {"clusters": packed.clusters.astype(np.uint32), "means": packed.means}
+    if packed.weights.shape[1]:  # means alone may be enough
+        arrays |= {"weights": packed.weights, "axes": packed.axes}
+    return more, arrays
+
+
+def _wavelet(
+    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings
+) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
+    frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
+    work = wavelet(surfaces, caster, settings.texels, settings.keep, frame, rows, settings.shadows)
+    sparse = yield from work
+    arrays = {"counts": np.diff(sparse.starts).astype(np.uint32), "scales": sparse.scales}
+    if len(sparse.terms):  # a wholly hidden object has none
+        arrays |= {"terms": sparse.terms.astype(np.uint32), "steps": sparse.steps.astype(np.float32)}
+    return {"width": sparse.width}, arrays
+
+
+def wavelet_rows(bake: Bake) -> SparseRows:
+    """The rows of a file of Kind.WAVELET."""
+    arrays, nothing = bake.arrays, np.zeros(0)
+    starts = np.concatenate([[0], np.cumsum(arrays["counts"].astype(np.int64))])
+    terms, steps = arrays.get("terms", nothing), arrays.get("steps", nothing)
+    return SparseRows(starts, terms.astype(np.uint16), steps.astype(np.int16), arrays["scales"], bake.about["width"])
+
+
+def glossy_matrices(bake: Bake) -> Compressed:
+    """The compressed matrices of a file of Kind.GLOSSY; ``about["matrix"]`` is the shape of one."""
+    arrays, means = bake.arrays, bake.arrays["means"]
+    weights = arrays.get("weights", np.zeros((len(arrays["clusters"]), 0), np.float16))
+    axes = arrays.get("axes", np.zeros((len(means), 0, means.shape[1]), np.float16))
+    clusters = arrays["clusters"].astype(np.uint16)
+    return Compressed(clusters, weights, means, axes, bake.about["rms"], bake.about["worst"])
