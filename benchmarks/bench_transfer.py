@@ -1,7 +1,8 @@
 """What precomputed radiance transfer costs and errs by, into docs/prt.md.
 
-`.venv/bin/python benchmarks/bench_transfer.py`, half a minute. A ball on a floor, 4,100 vertices. Errors are root mean squares over all vertices, over the root mean square of what is
-right: for terms and bands the sum over all texels of the light, for directions the bake with the most of them.
+`.venv/bin/python benchmarks/bench_transfer.py`, half a minute. A ball on a floor, 4,100 vertices. Errors are root mean
+squares over all vertices, over the root mean square of what is right: for terms and bands the sum over all texels of
+the light, for directions the bake with the most of them.
 """
 
 from __future__ import annotations
