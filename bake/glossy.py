@@ -10,6 +10,7 @@ As in ``transfer``, what is not blocked is exact (a hemisphere's product matrix)
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,8 +41,13 @@ def open_matrices(normals: Array, light: int, result: int) -> Array:
     return (above @ tensor).reshape(len(normals), result**2, light**2)
 
 
+def what_is_seen(sampling: Sampling) -> Sampling:
+    """The bake of diffuse transfer whose vectors are those of the surfaces that block: a bounce less."""
+    return replace(sampling, bounces=sampling.bounces - 1)
+
+
 def glossy(
-    surfaces: Surfaces, caster: Caster, sampling: Sampling, result: int, rows: Array
+    surfaces: Surfaces, caster: Caster, sampling: Sampling, result: int, rows: Array, lit: Array | None = None
 ) -> Generator[Progress, None, Array]:
     """Matrices (len(rows), channels, result², bands²) float32 of the vertices ``rows``, ascending; world axes.
 
@@ -52,10 +58,9 @@ def glossy(
         raise ValueError(f"glossy transfer of {sampling.bands} bands to {result}: their sum can be {sh.MAX_BANDS + 1}")
     if not sampling.shadows:
         return open_matrices(surfaces.normals[rows], sampling.bands, result)[:, None].astype(np.float32)
-    lit = None
-    if sampling.bounces:
-        one_less = Sampling(sampling.bands, sampling.directions, True, sampling.bounces - 1)
-        lit = yield from scaled(diffuse(surfaces, caster, one_less), 0.0, 0.5)
+    start = 0.0
+    if lit is None and sampling.bounces:
+        lit, start = (yield from scaled(diffuse(surfaces, caster, what_is_seen(sampling)), 0.0, 0.5)), 0.5
     directions = spread(sampling.directions)
     weight = 4.0 * np.pi / sampling.directions
     out, back = sh.evaluate(directions, result), sh.evaluate(directions, sampling.bands)
@@ -63,7 +68,6 @@ def glossy(
     channels = 1 if lit is None else surfaces.reflectance.shape[1]
     matrices = np.empty((len(rows), channels, result**2, sampling.bands**2), np.float32)
     work, done = pieces(rows, sampling.directions), 0
-    start = 0.5 if sampling.bounces else 0.0
     for piece in work:
         yield Progress(start + (1.0 - start) * done / len(rows), "glossy")
         blocked = trace(surfaces, caster, piece, directions, lit is not None)

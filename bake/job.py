@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Generator, Hashable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..scene.data import Array, Instance, Scene, Visibility
 from . import sh
 from .compress import Compressed, compress
 from .file import Bake
-from .glossy import glossy, turn_matrices
+from .glossy import glossy, turn_matrices, what_is_seen
 from .haar import SparseRows
 from .occlusion import Caster, make_caster
 from .surfaces import Surfaces, frame_of, gather, mesh_fingerprint
@@ -35,11 +35,14 @@ class BakeSettings:
     """What a bake costs and how good it is. Kinds leave alone what is not theirs."""
 
     kind: Kind = Kind.DIFFUSE
-    bands: int = 5  # DIFFUSE 1..11, GLOSSY with result_bands 12 together: the light's detail
+    bands: int = 5  # 1..11, GLOSSY with result_bands 12 together: the light's detail; WAVELET: of light that bounced
     result_bands: int = 5  # GLOSSY: detail of what arrives
-    directions: int = 1024  # DIFFUSE, GLOSSY: rays a vertex, over the whole sphere
+    directions: int = 1024  # rays a vertex, over the whole sphere; WAVELET: of light that bounced, texels are its rays
     shadows: bool = True
-    bounces: int = 2  # DIFFUSE, GLOSSY
+    bounces: int = 2  # by way of other surfaces
+    cuts: int = (
+        32  # with bounces: how finely large triangles reflect, in parts of the scene's diagonal; 0: by their corners
+    )
     error: float = 0.01  # GLOSSY: root mean square error of the compression, of the matrices' length
     texels: int = 32  # WAVELET: a power of two, up to 64; along a side of a face of the light's cube map
     keep: float = 0.999  # WAVELET: the part of each row's energy that is kept
@@ -48,7 +51,14 @@ class BakeSettings:
     def __post_init__(self) -> None:
         """Raises ValueError naming the setting that is out of its limits."""
         limits: dict[str, tuple[float, float]] = {"bands": (1, sh.MAX_BANDS), "directions": (16, 65536)}
-        limits |= {"bounces": (0, 64), "error": (0, 1), "keep": (0, 1), "texels": (1, 64), "result_bands": (1, 11)}
+        limits |= {
+            "bounces": (0, 64),
+            "cuts": (0, 256),
+            "error": (0, 1),
+            "keep": (0, 1),
+            "texels": (1, 64),
+            "result_bands": (1, 11),
+        }
         for name, (low, high) in limits.items():
             if not low <= getattr(self, name) <= high:
                 raise ValueError(f"{name} is {getattr(self, name)}: it can be {low} to {high}")
@@ -103,7 +113,7 @@ def bake_objects(
     missing = [key for key in keys if key not in by_key]
     if missing:
         raise ValueError(f"the scene has no object {missing[0]!r}")
-    surfaces = gather(scene, frozenset(keys))
+    surfaces = gather(scene, frozenset(keys), settings.cuts if settings.bounces and settings.shadows else 0)
     caster = make_caster(surfaces.corners[surfaces.blocks], settings.rays)
     yield Progress(0.0, f"rays by {caster.name}")
     instances = [by_key[key] for key in keys]
@@ -145,19 +155,26 @@ def _diffuse(
 def _one_by_one(
     surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
 ) -> Generator[Progress, None, Found]:
+    """Glossy matrices or wavelet rows of each; what they have in common, light that bounced, is found once before."""
+    sampling, bounced, start = _sampling(settings), None, 0.0
+    if settings.bounces and settings.shadows:
+        wanted = what_is_seen(sampling) if settings.kind is Kind.GLOSSY else sampling
+        bounced, start = (yield from scaled(diffuse(surfaces, caster, wanted), 0.0, 0.4)), 0.4
     found: Found = {}
     for number, instance in enumerate(instances):
         of_one = _glossy if settings.kind is Kind.GLOSSY else _wavelet
-        work = of_one(surfaces, caster, instance, settings)
-        found[instance.key] = yield from scaled(work, number / len(instances), 1.0 / len(instances))
+        part = (1.0 - start) / len(instances)
+        found[instance.key] = yield from scaled(
+            of_one(surfaces, caster, instance, settings, bounced), start + number * part, part
+        )
     return found
 
 
 def _glossy(
-    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings
+    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
     rows = _rows(surfaces, instance)
-    bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows)
+    bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows, seen)
     matrices = yield from scaled(bake, 0.0, 0.8)
     matrices = turn_matrices(matrices, frame_of(instance.world_from_object))
     packed = yield from scaled(compress(matrices.reshape(len(rows), -1), settings.error), 0.8, 0.2)
@@ -169,14 +186,17 @@ def _glossy(
 
 
 def _wavelet(
-    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings
+    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, lit: Array | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
     frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
     work = wavelet(surfaces, caster, settings.texels, settings.keep, frame, rows, settings.shadows)
-    sparse = yield from work
+    sparse = yield from scaled(work, 0.0, 0.8)
     arrays = {"counts": np.diff(sparse.starts).astype(np.uint32), "scales": sparse.scales}
     if len(sparse.terms):  # a wholly hidden object has none
         arrays |= {"terms": sparse.terms.astype(np.uint32), "steps": sparse.steps.astype(np.float32)}
+    if lit is not None:
+        first = yield from scaled(diffuse(surfaces, caster, replace(_sampling(settings), bounces=0), rows), 0.8, 0.2)
+        arrays["bounced"] = sh.rotate(lit[rows] - first[rows], frame.T).astype(np.float16)
     return {"width": sparse.width}, arrays
 
 

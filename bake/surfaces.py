@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,11 @@ from ..scene.data import Array, Image, Instance, Material, Mesh, Scene, Visibili
 
 # Rays leave the surface by this part of the object's size, so that they do not hit the triangle they start on.
 _LIFT = 1e-4
+# And from beside the vertex, along the surface, by this part of the way to the middles of its triangles: a floor's
+# corner lies in the planes of two walls, and rays from there would pass behind them.
+_INWARDS = 0.01
+# A triangle is cut into at most so many by so many.
+_MOST_CUTS = 64
 # Where in a triangle its colour is looked up: four points a side's worth, as barycentric coordinates.
 _SPOTS = np.array([(i + 1, j + 1, 4 - i - j) for i in range(4) for j in range(4 - i)]) / 6.0
 
@@ -27,7 +32,7 @@ class Surfaces:
     blocks: Array  # (T,) bool: takes part in shadows
     positions: Array  # (V, 3) float64, world space, lifted off the surface: where rays start
     normals: Array  # (V, 3) float64, world space, unit
-    runs: Mapping[Hashable, slice]  # Instance.key -> its rows of the vertex arrays
+    runs: Mapping[Hashable, slice]  # Instance.key -> its rows of the vertex arrays; behind them are those of pieces
 
 
 def mesh_vertices(mesh: Mesh) -> tuple[Array, Array]:
@@ -58,8 +63,13 @@ def frame_of(world_from_object: Array) -> Array:
     return u @ np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(v)]) @ v
 
 
-def gather(scene: Scene, bake: frozenset[Hashable]) -> Surfaces:
-    """The surfaces of ``scene``. Instances named by ``bake`` are there even where they block no light."""
+def gather(scene: Scene, bake: frozenset[Hashable], cuts: int = 0) -> Surfaces:
+    """The surfaces of ``scene``. Instances named by ``bake`` are there even where they block no light.
+
+    With ``cuts``, triangles larger than the scene's diagonal over it are cut into pieces that each have one vertex of
+    their own, in the middle: a wall of two triangles reflects what happens between its corners. 0 leaves all as they
+    are.
+    """
     used = [i for i in scene.instances if i.key in bake or i.visibility & Visibility.SHADOW]
     runs: dict[Hashable, slice] = {}
     parts: list[tuple[Array, ...]] = []
@@ -67,7 +77,7 @@ def gather(scene: Scene, bake: frozenset[Hashable]) -> Surfaces:
     for instance in used:
         mesh = scene.meshes[instance.mesh]
         first, vertices = mesh_vertices(mesh)
-        corners, positions, normals = _placed(mesh, instance.world_from_object, first)
+        corners, positions, normals = _placed(mesh, instance.world_from_object, first, vertices)
         facing = _facing(corners, normals[vertices.reshape(-1, 3)])
         blocks = np.full(len(corners), bool(instance.visibility & Visibility.SHADOW))
         colour = _reflectance(mesh, instance, scene)
@@ -79,11 +89,59 @@ def gather(scene: Scene, bake: frozenset[Hashable]) -> Surfaces:
     corners, rows, facing, colour, blocks, positions, normals = (np.concatenate(p) for p in zip(*parts, strict=True))
     if (colour == colour[:, :1]).all():
         colour = colour[:, :1]
-    return Surfaces(corners, rows, facing, colour, blocks, positions, normals, runs)
+    surfaces = Surfaces(corners, rows, facing, colour, blocks, positions, normals, runs)
+    return _cut(surfaces, cuts) if cuts else surfaces
 
 
-def _placed(mesh: Mesh, matrix: Array, first: Array) -> tuple[Array, Array, Array]:
-    """World-space corners of the triangles; lifted positions and unit normals of the vertices."""
+def _cut(surfaces: Surfaces, cuts: int) -> Surfaces:
+    """Each large triangle in n x n pieces of one shape, by its area: slivers are not cut into more slivers."""
+    corners = surfaces.corners
+    points = corners.reshape(-1, 3)
+    side = np.linalg.norm(np.ptp(points, axis=0)) / cuts
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    number = np.ceil(np.sqrt(areas / (0.5 * side**2 + 1e-300))).clip(1, _MOST_CUTS).astype(np.int64)
+    sources, pieces, middles = [np.nonzero(number == 1)[0]], [corners[number == 1]], []
+    for n in np.unique(number[number > 1]):
+        large = np.nonzero(number == n)[0]
+        shape = _pieces(n)
+        sources.append(np.repeat(large, len(shape)))
+        pieces.append(np.einsum("pkc,tcx->tpkx", shape, corners[large]).reshape(-1, 3, 3))
+        middles.append(np.tile(shape.mean(axis=1), (len(large), 1)))
+    source, whole = np.concatenate(sources), len(sources[0])
+    rows = surfaces.triangle_vertices[source]
+    if middles:
+        middle, of = np.concatenate(middles)[:, :, None], rows[whole:]
+        positions = (middle * surfaces.positions[of]).sum(axis=1)
+        normals = (middle * surfaces.normals[of]).sum(axis=1)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        rows[whole:] = len(surfaces.positions) + np.arange(len(of))[:, None]
+        surfaces = replace(
+            surfaces,
+            positions=np.concatenate([surfaces.positions, positions]),
+            normals=np.concatenate([surfaces.normals, normals]),
+        )
+    return replace(
+        surfaces,
+        corners=np.concatenate(pieces),
+        triangle_vertices=rows,
+        facing=surfaces.facing[source],
+        reflectance=surfaces.reflectance[source],
+        blocks=surfaces.blocks[source],
+    )
+
+
+def _pieces(n: int) -> Array:
+    """(n², 3, 3): the barycentric coordinates of the corners of the n² pieces of a triangle, turned as it is."""
+    i, j = np.nonzero(np.add.outer(np.arange(n), np.arange(n)) < n)
+    upright = np.stack([np.stack([i, j]), np.stack([i + 1, j]), np.stack([i, j + 1])])  # corner, axis, piece
+    i, j = i[i + j < n - 1], j[i + j < n - 1]
+    hanging = np.stack([np.stack([i + 1, j]), np.stack([i + 1, j + 1]), np.stack([i, j + 1])])
+    uv = np.concatenate([upright, hanging], axis=2).transpose(2, 0, 1) / n
+    return np.concatenate([1.0 - uv.sum(axis=2, keepdims=True), uv], axis=2)
+
+
+def _placed(mesh: Mesh, matrix: Array, first: Array, vertices: Array) -> tuple[Array, Array, Array]:
+    """World-space corners of the triangles; where rays start and unit normals of the vertices."""
     linear, offset = matrix[:3, :3].astype(np.float64), matrix[:3, 3]
     points = mesh.positions.astype(np.float64) @ linear.T + offset
     # Normals go by the cofactors: the inverse transposed, and still there where the object is scaled flat.
@@ -93,7 +151,12 @@ def _placed(mesh: Mesh, matrix: Array, first: Array) -> tuple[Array, Array, Arra
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(lengths > 0, normals / np.where(lengths > 0, lengths, 1), [0.0, 0.0, 1.0])
     size = np.linalg.norm(np.ptp(points, axis=0)) if len(points) else 0.0
-    return points.reshape(-1, 3, 3), points[first] + normals * (_LIFT * size), normals
+    middles = np.repeat(points.reshape(-1, 3, 3).mean(axis=1), 3, axis=0)
+    meeting = np.maximum(np.bincount(vertices, minlength=len(first)), 1)
+    inwards = np.stack([np.bincount(vertices, axis, len(first)) for axis in middles.T], axis=-1) / meeting[:, None]
+    inwards -= points[first]
+    inwards -= (inwards * normals).sum(axis=1, keepdims=True) * normals
+    return points.reshape(-1, 3, 3), points[first] + normals * (_LIFT * size) + _INWARDS * inwards, normals
 
 
 def _facing(corners: Array, normals: Array) -> Array:

@@ -149,3 +149,38 @@ def test_grey_scene_has_one_channel():
 def test_scene_without_surfaces_is_refused():
     with pytest.raises(ValueError, match="no surface"):
         gather(Scene(), frozenset())
+
+
+@pytest.mark.parametrize("cuts", [1, 7, 40])
+def test_cut_triangles_cover_what_they_did(cuts):
+    """Area, normals, colours and what blocks stay; own vertices keep their rows."""
+    scene = placed(quad("floor"), sphere("ball", (0, 0, 1), 0.5, rings=6), albedo=(0.1, 0.2, 0.3))
+    whole, cut = (gather(scene, frozenset(), c) for c in (0, cuts))
+
+    def areas(surfaces):
+        a, b, c = surfaces.corners.swapaxes(0, 1)
+        return np.cross(b - a, c - a)
+
+    assert areas(cut)[:, 2].sum() == pytest.approx(areas(whole)[:, 2].sum(), abs=1e-6)
+    assert np.linalg.norm(areas(cut), axis=1).sum() == pytest.approx(np.linalg.norm(areas(whole), axis=1).sum())
+    own = len(whole.positions)
+    assert np.array_equal(cut.positions[:own], whole.positions)
+    assert len(cut.positions) - own == (cut.triangle_vertices[:, 0] >= own).sum()
+    assert cut.triangle_vertices.max() < len(cut.positions)
+    assert np.allclose(np.linalg.norm(cut.normals, axis=1), 1)
+    largest = np.linalg.norm(areas(cut), axis=1).max()
+    diagonal = np.linalg.norm(np.ptp(whole.corners.reshape(-1, 3), axis=0))
+    assert largest <= max((diagonal / cuts) ** 2 * 1.0001, 0)
+    origins, towards = rays(500)
+    found = [make_caster(s.corners).blocked(origins, towards) for s in (whole, cut)]
+    assert (found[0] == found[1]).mean() > 0.995
+
+
+def test_rays_from_the_corner_of_a_room_stay_in_it():
+    """Floor corners lie in the walls' planes; started there, rays would leave by the wall's edge."""
+    surfaces = gather(placed(box("room", (-1, -1, -1), (1, 1, 1), inward=True)), frozenset())
+    directions = np.random.default_rng(0).normal(size=(2000, 3))
+    caster = make_caster(surfaces.corners)
+    for position, normal in zip(surfaces.positions, surfaces.normals, strict=True):
+        up = directions[directions @ normal > 0]
+        assert caster.blocked(np.broadcast_to(position, up.shape), up).mean() > 0.999

@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rebound.bake import haar, sh
+from rebound.bake import sphere as sphere_of
 from rebound.bake.file import read_bake
 from rebound.bake.job import (
     BakeSettings,
@@ -157,6 +159,31 @@ def test_bake_of_one_object_knows_the_others():
     dim = finish(bake_objects(both, ["floor"], quick))["floor"].arrays["diffuse"]
     bright = finish(bake_objects(alone, ["floor"], quick))["floor"].arrays["diffuse"]
     assert dim[..., 0].min() < 0.9 * bright[..., 0].min()
+
+
+def test_wavelet_rows_and_what_bounced_add_up_to_the_diffuse_bake():
+    """Under a sky of two bands. 0.01: texels instead of directions, half floats."""
+    sky = np.array([3.0, 0.4, 1.0, -0.3])
+    cube = sh.evaluate(sphere_of.cube_directions(32), 2) @ sky
+    settings = BakeSettings(Kind.WAVELET, bands=2, bounces=2, directions=4096)
+    rows = finish(bake_objects(scene(), ["ball"], settings))["ball"]
+    right = (
+        finish(bake_objects(scene(), ["ball"], replace(settings, kind=Kind.DIFFUSE)))["ball"].arrays["diffuse"] @ sky
+    )
+    bounced = rows.arrays["bounced"].astype(np.float64) @ sky
+    found = wavelet_rows(rows).dot(haar.forward(cube).reshape(-1))[:, None] + bounced
+    assert bounced.max() > 0.05
+    assert np.abs(found - right).mean() < 0.01
+    assert np.abs(found - right).max() < 0.05
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_objects_baked_together_are_as_baked_alone(kind):
+    settings = BakeSettings(kind, bands=3, result_bands=3, directions=64, bounces=1, texels=8)
+    both = finish(bake_objects(scene(), ["ball", "floor"], settings))
+    alone = finish(bake_objects(scene(), ["ball"], settings))["ball"]
+    assert {n: a.tobytes() for n, a in both["ball"].arrays.items()} == {n: a.tobytes() for n, a in alone.arrays.items()}
+    assert both["ball"].about == alone.about
 
 
 def test_missing_object_is_named():
