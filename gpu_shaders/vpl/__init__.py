@@ -17,7 +17,7 @@ Limits: docs/vpl.md.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...device.interface import Device, Target
 from ..frame.inputs import FrameInputs, LightTargets
@@ -34,6 +34,9 @@ from .shaders import SHADERS
 from .sources import CACHE, EMITTERS, SKY_PATCHES, Sources
 from .structs import VPL_FRAME
 from .views import VIEWS, view_occlusion, view_pool, view_voxels
+
+if TYPE_CHECKING:
+    from ...gpu_scene import GpuScene
 
 # How far a sample is after each step, for the progress bar.
 MAPS_DONE, VOXELS_DONE, CACHE_DONE = 0.2, 0.4, 0.6
@@ -71,7 +74,8 @@ class Vpl:
         self._settings = settings
         # Noise goes on from picture to picture where they are averaged, else every picture has the same.
         self._picture = self._picture + 1 if settings["reuse"] else inputs.sample
-        with_cache, most = self._wants_cache(inputs, settings), int(settings["maps_at_once"]) if inputs.follows else 0
+        with_cache = settings["bounces"] == "MANY" or _has_first_hand(gpu_scene)
+        most = int(settings["maps_at_once"]) if inputs.follows else 0
         for done in self.sources.update_all(gpu_scene, int(settings["resolution"]), with_cache, most):
             yield MAPS_DONE * done
         inputs.mark("light maps")
@@ -84,14 +88,15 @@ class Vpl:
             yield VOXELS_DONE + (CACHE_DONE - VOXELS_DONE) * done
         inputs.mark("virtual lights")
         candidates = self._candidates(inputs, settings, kinds=ALL_KINDS, number=self._picture)
-        about = PoolState(self._picture, self.sources.revision)
+        settles = self.sources.tile_of(CACHE) is not None and self.cache.settles
+        about = PoolState(self._picture, self.sources.revision, _has_first_hand(gpu_scene), settles)
         for done in self.gathering.draw(inputs, settings, candidates, about, targets):
             yield CACHE_DONE + (1.0 - CACHE_DONE) * done
 
     @property
     def provisional(self) -> bool:
         """See ``Technique.provisional``."""
-        return self.sources.pending > 0
+        return self.sources.pending > 0 or self.gathering.settles
 
     def view(
         self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target, light: int = 0
@@ -120,11 +125,6 @@ class Vpl:
         self._picture = 0
         self.cache.forget()
         self.gathering.forget()
-
-    def _wants_cache(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> bool:
-        """Whether some light's first or further bounces come from the cache."""
-        gpu_scene = inputs.gpu_scene
-        return settings["bounces"] == "MANY" or gpu_scene.emits or any(gpu_scene.scene.world.color)
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
@@ -226,3 +226,8 @@ class Vpl:
             **self.voxels.bindings(),
             "vpl_frame": VPL_FRAME.pack([frame], for_uniform=True),
         }
+
+
+def _has_first_hand(gpu_scene: GpuScene) -> bool:
+    """Whether emitters or the sky give light: direct light from the pool, whose first bounce is the cache's."""
+    return gpu_scene.emits or any(gpu_scene.scene.world.color)

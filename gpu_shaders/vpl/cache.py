@@ -26,11 +26,11 @@ ROUNDS = 4
 # Before a picture that follows none the cache is updated until so much of all light is left that goes on, and within
 # these limits: each update takes light a bounce further.
 LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
+# So many times as often after an edit: LEFT of a light that went out may be more than all that is lit now.
+AFTER_EDIT = 2
 # Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
 # part of them.
 NEWER = 0.5
-# Pictures after an edit in which all points gather, that old light may go at once.
-SETTLING = 4
 # Updates after which no more points come to light that had none, so that the index of them stays as it is.
 COME_TO_LIGHT = 4.0
 
@@ -44,21 +44,28 @@ class Cache:
         self._flux: tuple[Texture, Target] | None = None  # of the atlas
         self._next_row = 0
         self._revision = -1  # of the scene that was last gathered in
-        self._settling = 0  # pictures to come in which all points gather
         self._updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
         self._counts = 1.0  # part of them that a mean is of
 
     def plan(self, gpu_scene: GpuScene, *, many: bool, rows: int) -> tuple[int, int]:
-        """How often to gather for this picture, and in how many of the points' rows, ``rows`` if nothing changed."""
+        """How often to gather for this picture, and in how many of the points' rows: in ``rows``, but in all of them
+        after an edit, so that the light of before is soon gone.
+        """
         rounds = 1
         if self._revision != gpu_scene.revision:
             bounces = _bounces(gpu_scene.scene) if many else 1
             if self._revision < 0:
                 rounds = bounces
-            self._revision, self._settling, self._updates = gpu_scene.revision, SETTLING, float(1 - bounces)
+            else:
+                bounces *= AFTER_EDIT
+            self._revision, self._updates = gpu_scene.revision, float(1 - bounces)
         self._counts = NEWER if many else 1.0
-        self._settling -= 1
-        return rounds, POINTS_SIDE if self._settling >= 0 else rows
+        return rounds, POINTS_SIDE if self.settles else rows
+
+    @property
+    def settles(self) -> bool:
+        """Whether light of before the newest edit is left, or some of the bounces after it are still to come."""
+        return self._updates <= 0.0
 
     @property
     def comes_to_light(self) -> bool:

@@ -18,6 +18,7 @@ from .shaders import (
     ATLAS_SAMPLERS,
     ATROUS,
     GATHER,
+    GATHER_TO_REUSE,
     REFLECT,
     REUSE,
     UPSAMPLE,
@@ -30,8 +31,9 @@ from .structs import OLD_VIEW
 # Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
 # the scene did. A still view's mean grows without end.
 LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
-# Samples after an edit, that of the edit included, whose mean stays short. One alone would leave the old light
-# 1 / (n + 1) of the mean after n samples; four leave it 1 / 16, and then a part of that which falls as 1 / n.
+# Samples after an edit, that of the edit included, whose mean stays short and still holds light of before; longer
+# while the cache does. They are provisional: once they are over, means and the picture begin anew, or a bright light
+# that went out would stay to be seen for good.
 SETTLING = 4
 # Samples that an old reservoir may stand for.
 MOST_REUSE = 2.0
@@ -45,22 +47,35 @@ GATHER_DONE, FILTER_DONE = 0.7, 0.8
 
 @dataclass(frozen=True)
 class PoolState:
-    """``number`` of the sample in its sequence of noise; ``sources_revision`` of the atlas that the pool is from."""
+    """``number`` of the sample in its sequence of noise; ``sources_revision`` of the atlas that the pool is from;
+    ``first_hand``: it may have emitters or the sky, whose light is direct; ``settles``: the cache still holds light of
+    before an edit.
+    """
 
     number: int
     sources_revision: int
+    first_hand: bool
+    settles: bool
 
 
 @dataclass(eq=False)
 class _Grid:
-    """Textures of one grid of gathering pixels. Those in pairs have the newest first."""
+    """Textures of one grid of gathering pixels. Those in pairs have the newest first.
+
+    Direct light that the gathering found is a part of its light; ``emitted``, ``direct_histories`` and ``direct_noisy``
+    keep it apart, empty where there is none.
+    """
 
     size: tuple[int, int]
+    first_hand: bool
     surfaces: list[Texture]
     gathered: list[Texture]
     reservoirs: list[Texture]
     histories: list[Texture]
     noisy: list[Texture]
+    emitted: list[Texture]
+    direct_histories: list[Texture]
+    direct_noisy: list[Texture]
     gather_targets: list[Target]
     reuse_targets: list[Target]
     noisy_targets: list[Target]
@@ -77,12 +92,22 @@ class _Grid:
             *self.reservoirs,
             *self.histories,
             *self.noisy,
+            *self.emitted,
+            *self.direct_histories,
+            *self.direct_noisy,
             *self.reflected,
         )
 
     def turn(self) -> None:
         """Make what is newest the picture before."""
-        for pair in (self.surfaces, self.gather_targets, self.reservoirs, self.histories, self.reuse_targets):
+        for pair in (
+            self.surfaces,
+            self.gather_targets,
+            self.reservoirs,
+            self.histories,
+            self.direct_histories,
+            self.reuse_targets,
+        ):
             pair.reverse()
 
 
@@ -131,10 +156,10 @@ class Gathering:
         """
         stride = STRIDES[str(settings["scale"])]
         offset = grid_offset(inputs.seed, about.number, stride)
-        grid = self._fitting(inputs, stride)
-        reuses = bool(settings["reuse"])
+        reuses, glossy = bool(settings["reuse"]), inputs.gpu_scene.is_glossy
+        grid = self._fitting(inputs, stride, reuses and about.first_hand)
         self.device.fullscreen(
-            GATHER[reuses, inputs.gpu_scene.is_glossy],
+            GATHER_TO_REUSE[glossy, grid.first_hand] if reuses else GATHER[glossy],
             grid.gather_targets[0],
             normal_tx=inputs.gbuffer.normal,
             **candidates,
@@ -144,9 +169,12 @@ class Gathering:
         yield GATHER_DONE
         now = self._now(inputs, stride, offset, about.sources_revision)
         if reuses:
-            self._reuse(inputs, grid, candidates, now)
-            light = self._filtered(grid) if settings["denoise"] else grid.noisy[0]
+            self._reuse(inputs, grid, candidates, now, about.settles)
+            light, direct = self._filtered(grid) if settings["denoise"] else (grid.noisy[0], grid.direct_histories[:1])
             self._upsample(inputs, now, grid.surfaces[0], light, targets.diffuse_indirect)
+            for part in direct:
+                self._upsample(inputs, now, grid.surfaces[0], part, targets.diffuse_indirect, gain=-1.0)
+                self._upsample(inputs, now, grid.surfaces[0], part, targets.diffuse_direct)
         else:
             for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
                 self._upsample(inputs, now, grid.surfaces[0], light, target)
@@ -156,6 +184,11 @@ class Gathering:
             self._reflect(inputs, settings, candidates, grid, now, targets)
             inputs.mark("reflect")
         self._before, self._drawn = now if reuses else None, now
+
+    @property
+    def settles(self) -> bool:
+        """Whether the means still hold light of before an edit."""
+        return self._settling > 0
 
     def view_bound(self, inputs: FrameInputs, candidates: Mapping[str, Any], target: Target) -> None:
         """Draw the light that the bound takes away, as this sample found it."""
@@ -205,19 +238,29 @@ class Gathering:
             self.device.free(resource)
         self._grid = self._before = self._drawn = None
 
-    def _reuse(self, inputs: FrameInputs, grid: _Grid, candidates: Mapping[str, Any], now: _Before) -> None:
+    def _reuse(
+        self, inputs: FrameInputs, grid: _Grid, candidates: Mapping[str, Any], now: _Before, pool_settles: bool
+    ) -> None:
         before = self._before
         history = reuse = 0.0
         if before is not None:
             still = inputs.sample > 0
             edited = before.scene_revision != now.scene_revision
-            self._settling = SETTLING if edited else max(self._settling - 1, 0)
+            settled = self._settling == 0
+            left = SETTLING if edited else max(self._settling - 1, 0)
+            self._settling = max(left, 1) if left or (pool_settles and not settled) else 0
             history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
             # Samples of a still view are to be independent, or their mean would converge more slowly.
             reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
+            if self._settling == 0 and not settled:
+                history = reuse = 0.0
+        direct: dict[str, Texture] = {}
+        if grid.first_hand:
+            direct = {"emitted_tx": grid.emitted[0], "direct_history_tx": grid.direct_histories[1]}
         self.device.fullscreen(
-            REUSE[inputs.gpu_scene.is_glossy],
+            REUSE[inputs.gpu_scene.is_glossy, grid.first_hand],
             grid.reuse_targets[0],
+            **direct,
             **{name: candidates[name] for name in REUSE_READS},
             surface_tx=grid.surfaces[0],
             reservoir_tx=grid.gathered[0],
@@ -252,15 +295,26 @@ class Gathering:
         for light, target in zip(grid.reflected, (targets.glossy_indirect, targets.glossy_direct), strict=True):
             self._upsample(inputs, now, grid.surfaces[0], light, target)
 
-    def _filtered(self, grid: _Grid) -> Texture:
-        newest = 0
+    def _filtered(self, grid: _Grid) -> tuple[Texture, list[Texture]]:
+        """All light, and the part of it that is direct."""
+        newest, direct = 0, grid.direct_histories[:1]
         for step in FILTER_STEPS:
-            light, target = grid.noisy[newest], grid.noisy_targets[1 - newest]
-            self.device.fullscreen(ATROUS, target, surface_tx=grid.surfaces[0], light_tx=light, pc_step=step)
+            self.device.fullscreen(
+                ATROUS[grid.first_hand],
+                grid.noisy_targets[1 - newest],
+                surface_tx=grid.surfaces[0],
+                light_tx=grid.noisy[newest],
+                **dict(zip(("direct_tx",), direct, strict=False)),
+                pc_step=step,
+            )
             newest = 1 - newest
-        return grid.noisy[newest]
+            direct = grid.direct_noisy[newest : newest + 1]
+        return grid.noisy[newest], direct
 
-    def _upsample(self, inputs: FrameInputs, now: _Before, surface: Texture, light: Texture, target: Target) -> None:
+    def _upsample(
+        self, inputs: FrameInputs, now: _Before, surface: Texture, light: Texture, target: Target, gain: float = 1.0
+    ) -> None:
+        """Add ``gain`` times the light of the gathering pixels to that of all."""
         self.device.fullscreen(
             UPSAMPLE,
             target,
@@ -271,38 +325,48 @@ class Gathering:
             light_tx=light,
             pc_stride=float(now.stride),
             pc_offset=now.offset,
+            pc_gain=gain,
         )
 
     def _now(self, inputs: FrameInputs, stride: int, offset: tuple[int, int], sources_revision: int) -> _Before:
         size = (inputs.view.width, inputs.view.height)
         return _Before(inputs.clip_from_world, size, offset, stride, inputs.gpu_scene.revision, sources_revision)
 
-    def _fitting(self, inputs: FrameInputs, stride: int) -> _Grid:
+    def _fitting(self, inputs: FrameInputs, stride: int, first_hand: bool) -> _Grid:
         """The grid of this picture's size, turned so that the picture before is the older of each pair."""
         size = grid_size(inputs.view, stride)
-        if self._grid is None or self._grid.size != size:
+        if self._grid is None or (self._grid.size, self._grid.first_hand) != (size, first_hand):
             self.free()
-            self._grid = _new_grid(self.device, size)
+            self._grid = _new_grid(self.device, size, first_hand)
         self._grid.turn()
         return self._grid
 
 
-def _new_grid(device: Device, size: tuple[int, int]) -> _Grid:
-    def pair() -> list[Texture]:
-        return [device.texture(size, "RGBA32F") for _ in range(2)]
+def _new_grid(device: Device, size: tuple[int, int], first_hand: bool) -> _Grid:
+    def pair(wanted: bool = True) -> list[Texture]:
+        return [device.texture(size, "RGBA32F") for _ in range(2 * wanted)]
 
     surfaces, gathered, reservoirs, histories, noisy, reflected = pair(), pair(), pair(), pair(), pair(), pair()
+    direct_histories, direct_noisy = pair(first_hand), pair(first_hand)
+    emitted = [device.texture(size, "RGBA32F")] if first_hand else []
     # Reuse writes the first of the noisy pair; the filter goes to and fro between both.
     return _Grid(
         size,
+        first_hand,
         surfaces,
         gathered,
         reservoirs,
         histories,
         noisy,
-        [device.target([surface, *gathered]) for surface in surfaces],
-        [device.target([r, h, noisy[0]]) for r, h in zip(reservoirs, histories, strict=True)],
-        [device.target([texture]) for texture in noisy],
+        emitted,
+        direct_histories,
+        direct_noisy,
+        [device.target([surface, *gathered, *emitted]) for surface in surfaces],
+        [
+            device.target([reservoirs[i], histories[i], noisy[0], *direct_histories[i : i + 1]])
+            for i in range(len(reservoirs))
+        ],
+        [device.target([noisy[i], *direct_noisy[i : i + 1]]) for i in range(len(noisy))],
         reflected,
         device.target(reflected),
     )

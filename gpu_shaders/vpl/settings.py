@@ -112,9 +112,9 @@ SETTINGS = (
         "reuse",
         "BOOL",
         "Reuse",
-        "Keep what the picture before has found, where it shows the same surfaces. On is calm from the first pictures "
-        "of a moving view, and light lags behind by some pictures; off knows nothing of other pictures",
-        False,
+        "Keep what samples and, in viewports, the pictures before have found, where they show the same surfaces. On is "
+        "calm from the first pictures of a moving view, and light lags behind by some; off knows nothing of others",
+        True,
         viewport_default=True,
         panel="Reuse and Denoising",
     ),
@@ -124,7 +124,7 @@ SETTINGS = (
         "Denoise",
         "Smooth the bounced light of neighbouring pixels of one surface as far as its noise goes. On is clean at once; "
         "off keeps the noise, and the finest detail",
-        False,
+        True,
         viewport_default=True,
         panel="Reuse and Denoising",
     ),

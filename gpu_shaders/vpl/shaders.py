@@ -130,19 +130,32 @@ def _candidate_pass(
 _COARSE = {"pc_stride": "INT", "pc_offset": "IVEC2"}
 
 
+_GLOSSY, _REUSE, _FIRST_HAND = ("GLOSSY", "1"), ("REUSE", "1"), ("FIRST_HAND", "1")
+_SWITCHES = (False, True)
+
+
+def _with_defines(name: str, glossy: bool, first_hand: bool) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Name and defines of a variant."""
+    chosen = [("_glossy", _GLOSSY)] * glossy + [("_first_hand", _FIRST_HAND)] * first_hand
+    return name + "".join(suffix for suffix, _ in chosen), tuple(define for _, define in chosen)
+
+
 def _gather(name: str, *defines: tuple[str, str]) -> Shader:
     outputs, samplers = ("out_surface", "out_indirect", "out_direct"), ("position_tx", "normal_tx")
+    if _REUSE in defines and _FIRST_HAND in defines:
+        outputs = (*outputs, "out_emitted")
     return _candidate_pass(name, "vpl/vpl_gather_frag.glsl", outputs, samplers, _COARSE, defines)
 
 
-_GLOSSY, _REUSE = ("GLOSSY", "1"), ("REUSE", "1")
-# By whether the result is reused, and whether anything in the scene is glossy.
-GATHER = {
-    (False, False): _gather("vpl_gather"),
-    (False, True): _gather("vpl_gather_glossy", _GLOSSY),
-    (True, False): _gather("vpl_gather_to_reuse", _REUSE),
-    (True, True): _gather("vpl_gather_to_reuse_glossy", _REUSE, _GLOSSY),
-}
+def _gather_to_reuse(glossy: bool, first_hand: bool) -> Shader:
+    name, defines = _with_defines("vpl_gather_to_reuse", glossy, first_hand)
+    return _gather(name, _REUSE, *defines)
+
+
+# By whether anything in the scene is glossy.
+GATHER = {False: _gather("vpl_gather"), True: _gather("vpl_gather_glossy", _GLOSSY)}
+# For the reuse, by that and by whether emitters or the sky give light, which is direct light and kept apart.
+GATHER_TO_REUSE = {(glossy, first): _gather_to_reuse(glossy, first) for glossy in _SWITCHES for first in _SWITCHES}
 
 VIEW_BOUND = _gather("vpl_view_bound", ("BOUND_VIEW", "1"))
 VIEW_VOXELS = Shader(
@@ -201,11 +214,18 @@ REFLECT = _candidate_pass(
 )
 
 
-def _reuse(name: str, *defines: tuple[str, str]) -> Shader:
+def _reuse(glossy: bool, first_hand: bool) -> Shader:
+    name, defines = _with_defines("vpl_reuse", glossy, first_hand)
+    direct = ("emitted_tx", "direct_history_tx") if first_hand else ()
     return Shader(
         name=name,
         fragment="vpl/vpl_reuse_frag.glsl",
-        outputs={"out_reservoir": "VEC4", "out_history": "VEC4", "out_noisy": "VEC4"},
+        outputs={
+            "out_reservoir": "VEC4",
+            "out_history": "VEC4",
+            "out_noisy": "VEC4",
+            **({"out_direct": "VEC4"} if first_hand else {}),
+        },
         samplers={
             **ATLAS_SAMPLERS,
             **VOXEL_SAMPLERS,
@@ -216,6 +236,7 @@ def _reuse(name: str, *defines: tuple[str, str]) -> Shader:
             "old_surface_tx": "FLOAT_2D",
             "old_reservoir_tx": "FLOAT_2D",
             "history_tx": "FLOAT_2D",
+            **{name: "FLOAT_2D" for name in direct},
         },
         uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME, "old_view": OLD_VIEW},
         constants={
@@ -226,23 +247,35 @@ def _reuse(name: str, *defines: tuple[str, str]) -> Shader:
     )
 
 
-# By whether anything in the scene is glossy.
-REUSE = {False: _reuse("vpl_reuse"), True: _reuse("vpl_reuse_glossy", _GLOSSY)}
+# As GATHER_TO_REUSE.
+REUSE = {(glossy, first): _reuse(glossy, first) for glossy in _SWITCHES for first in _SWITCHES}
 
-ATROUS = Shader(
-    name="vpl_atrous",
-    fragment="vpl/vpl_atrous_frag.glsl",
-    outputs={"out_light": "VEC4"},
-    samplers={"surface_tx": "FLOAT_2D", "light_tx": "FLOAT_2D"},
-    constants={"pc_step": "INT"},
-)
+
+def _atrous(first_hand: bool) -> Shader:
+    name, defines = _with_defines("vpl_atrous", False, first_hand)
+    return Shader(
+        name=name,
+        fragment="vpl/vpl_atrous_frag.glsl",
+        outputs={"out_light": "VEC4", **({"out_direct": "VEC4"} if first_hand else {})},
+        samplers={
+            "surface_tx": "FLOAT_2D",
+            "light_tx": "FLOAT_2D",
+            **({"direct_tx": "FLOAT_2D"} if first_hand else {}),
+        },
+        constants={"pc_step": "INT"},
+        defines=defines,
+    )
+
+
+# By whether direct light is kept apart.
+ATROUS = {first: _atrous(first) for first in _SWITCHES}
 
 UPSAMPLE = Shader(
     name="vpl_upsample",
     fragment="vpl/vpl_upsample_frag.glsl",
     outputs={"out_light": "VEC4"},
     samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "surface_tx": "FLOAT_2D", "light_tx": "FLOAT_2D"},
-    constants={"pc_stride": "FLOAT", "pc_offset": "VEC2"},
+    constants={"pc_stride": "FLOAT", "pc_offset": "VEC2", "pc_gain": "FLOAT"},
 )
 
 INDEX_SCATTER = Shader(
@@ -302,6 +335,7 @@ SHADERS = (
     TILES,
     POOL,
     *GATHER.values(),
+    *GATHER_TO_REUSE.values(),
     VIEW_BOUND,
     VIEW_VOXELS,
     VIEW_HISTORY,
@@ -310,6 +344,6 @@ SHADERS = (
     VIEW_POOL,
     REFLECT,
     *REUSE.values(),
-    ATROUS,
+    *ATROUS.values(),
     UPSAMPLE,
 )

@@ -8,6 +8,9 @@ void main()
   out_surface = vec4(0.0);
   out_indirect = vec4(0.0);
   out_direct = vec4(0.0);
+#if defined(REUSE) && defined(FIRST_HAND)
+  out_emitted = vec4(0.0);
+#endif
   vec4 position = texelFetch(position_tx, pixel, 0);
   if (position.w <= 0.0) {
     return;
@@ -34,6 +37,9 @@ void main()
   bool lit = any(greaterThan(light, vec3(0.0)));
   out_indirect = vec4(intBitsToFloat(r.id), lit ? r.sum / r.target : 0.0, 1.0, 0.0);
   out_direct = vec4(carried + emitted, 1.0);
+#ifdef FIRST_HAND
+  out_emitted = vec4(emitted, 1.0);
+#endif
 #else
   int kind = vpl_id_kind(r.id);
   bool first_hand = kind == SOURCE_EMISSION || kind == SOURCE_SKY;

@@ -39,8 +39,8 @@ void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], 
 }
 
 /* The mean of what the four texels around `place` had, of those that show the same surface; w: of how many samples. `moment`
- * is the mean of the squared strength. */
-vec4 reuse_history(vec2 place, Gatherer at, out float moment)
+ * is the mean of the squared strength, `direct` the part of the mean that is direct light. */
+vec4 reuse_history(vec2 place, Gatherer at, out float moment, out vec3 direct)
 {
   ivec2 lower = ivec2(floor(place));
   vec2 part = place - vec2(lower);
@@ -48,6 +48,7 @@ vec4 reuse_history(vec2 place, Gatherer at, out float moment)
   vec4 sum = vec4(0.0);
   float weights = 0.0;
   moment = 0.0;
+  direct = vec3(0.0);
   for (int i = 0; i < 4; i++) {
     ivec2 corner = ivec2(i & 1, i >> 1);
     ivec2 texel = lower + corner;
@@ -60,11 +61,19 @@ vec4 reuse_history(vec2 place, Gatherer at, out float moment)
     if (weight > 1e-3) {
       sum += weight * texelFetch(history_tx, texel, 0);
       moment += weight * texelFetch(old_reservoir_tx, texel, 0).w;
+#ifdef FIRST_HAND
+      direct += weight * texelFetch(direct_history_tx, texel, 0).rgb;
+#endif
       weights += weight;
     }
   }
   moment /= max(weights, 1e-3);
-  return weights > 0.02 ? sum / weights : vec4(0.0);
+  if (weights <= 0.02) {
+    direct = vec3(0.0);
+    return vec4(0.0);
+  }
+  direct /= weights;
+  return sum / weights;
 }
 
 void main()
@@ -73,6 +82,9 @@ void main()
   out_reservoir = vec4(0.0);
   out_history = vec4(0.0);
   out_noisy = vec4(0.0);
+#ifdef FIRST_HAND
+  out_direct = vec4(0.0);
+#endif
   Gatherer at = surface_unpack(texelFetch(surface_tx, texel, 0));
   if (!at.exists) {
     return;
@@ -105,6 +117,10 @@ void main()
     }
   }
   vec3 light = texelFetch(rest_tx, texel, 0).rgb;
+  vec3 direct = vec3(0.0);
+#ifdef FIRST_HAND
+  direct = texelFetch(emitted_tx, texel, 0).rgb;
+#endif
   float weight = 0.0;
   if (r.id != 0) {
     Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
@@ -118,11 +134,15 @@ void main()
     if (!own_choice && !reach_sees(at.P, at.N, math_toward(at.P, vpl_frame.eye), vpl)) {
       weight = 0.0;
     }
-    light += vpl_light(vpl, at.P, at.N) * weight;
+    vec3 chosen = vpl_light(vpl, at.P, at.N) * weight;
+    int kind = vpl_id_kind(r.id);
+    light += chosen;
+    direct += kind == SOURCE_EMISSION || kind == SOURCE_SKY ? chosen : vec3(0.0);
   }
 
   float moment = 0.0;
-  vec4 history = before ? reuse_history(place, at, moment) : vec4(0.0);
+  vec3 direct_history = vec3(0.0);
+  vec4 history = before ? reuse_history(place, at, moment, direct_history) : vec4(0.0);
   float samples = min(history.w, pc_most_history) + 1.0;
   vec3 mean = mix(history.rgb, light, 1.0 / samples);
   float strength = vpl_strength(light);
@@ -135,4 +155,7 @@ void main()
   out_reservoir = vec4(intBitsToFloat(r.id), weight, r.seen, moment);
   out_history = vec4(mean, samples);
   out_noisy = vec4(mean, variance);
+#ifdef FIRST_HAND
+  out_direct = vec4(mix(direct_history, direct, 1.0 / samples), 0.0);
+#endif
 }

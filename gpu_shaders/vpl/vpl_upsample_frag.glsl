@@ -33,5 +33,5 @@ void main()
     sum += weight * texelFetch(light_tx, from, 0).rgb;
     weights += weight;
   }
-  out_light = vec4(weights > 0.0 ? sum / weights : vec3(0.0), 1.0);
+  out_light = vec4(weights > 0.0 ? pc_gain * sum / weights : vec3(0.0), 1.0);
 }

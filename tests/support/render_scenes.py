@@ -16,7 +16,15 @@ from rebound.settings import Settings
 Array = np.ndarray
 EVERYTHING = Visibility.CAMERA | Visibility.SHADOW | Visibility.BOUNCE
 # Small maps and few samples: a test that needs more says so.
-QUICK = {"shadow_resolution": 256, "rsm_resolution": 64, "rsm_gathers": 32, "vpl_bounces": "ONE"}
+QUICK = {
+    "shadow_resolution": 256,
+    "rsm_resolution": 64,
+    "rsm_gathers": 32,
+    "vpl_bounces": "ONE",
+    # Estimators are judged by what they find, not by what is left of it after a filter.
+    "vpl_reuse": False,
+    "vpl_denoise": False,
+}
 
 
 # --- meshes ----------------------------------------------------------------------------------------------------------
