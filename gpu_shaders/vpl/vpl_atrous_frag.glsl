@@ -38,9 +38,9 @@ void main()
       continue;
     }
     vec4 light = texelFetch(light_tx, from, 0);
-    float weight = (aside.x * aside.y == 0 ? 0.5 : 0.25) * surface_alike(at, other) *
-                   exp(-abs(vpl_strength(light.rgb) - level) /
-                       (ATROUS_DEVIATIONS * sqrt(own.w + light.w) + 1e-6 + 1e-3 * level));
+    float weight =
+        (aside.x * aside.y == 0 ? 0.5 : 0.25) * surface_alike(at, other) *
+        exp(-abs(vpl_strength(light.rgb) - level) / (ATROUS_DEVIATIONS * sqrt(own.w + light.w) + 1e-6 + 1e-3 * level));
     sum += weight * light.rgb;
 #ifdef FIRST_HAND
     direct += weight * texelFetch(direct_tx, from, 0).rgb;
