@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
-from ..gpu_shaders.materials import is_supported
+from ..gpu_shaders.materials import gives, is_supported
 from .node_graph import COLOR, FLOAT, SHADER, VECTOR, Input, Link, Node, NodeGraph, Place, ReadGraph, Slot, Values
 from .node_tables import curve_rows
 from .nodes import MAX_STEPS, Socket, active_output, find_input, node_tree, step_back
@@ -37,7 +37,7 @@ def read_graph(material, read_image: ReadImage) -> ReadGraph:
     A material without nodes is a Diffuse BSDF of its viewport colour.
     """
     reader = _Reader(read_image)
-    tree = node_tree(material)
+    tree, socket = node_tree(material), None
     if tree is None:
         surface = reader.diffuse(tuple(material.diffuse_color[:3]))
     else:
@@ -46,6 +46,8 @@ def read_graph(material, read_image: ReadImage) -> ReadGraph:
         if socket:
             reader.read_inputs_first(socket)
         surface = reader.source(socket, SHADER).source if socket else None
+    if isinstance(surface, Slot) and socket and socket.socket.is_linked:
+        surface = reader.constant(surface)
     link = surface if isinstance(surface, Link) else None
     return ReadGraph(
         NodeGraph(tuple(reader.nodes), link), reader.values.array(), tuple(reader.images), tuple(reader.unsupported)
@@ -118,6 +120,8 @@ class _Reader:
         if own and name in NORMALS:
             return Place("normal")
         if own and name == "Vector" and node.bl_idname.startswith("ShaderNodeTex"):
+            if node.bl_idname == "ShaderNodeTexEnvironment":
+                return Place("position")
             image = node.bl_idname == "ShaderNodeTexImage"
             return Place("uv" if image and node.projection == "FLAT" else "generated")
         if own and name == "Tangent":
@@ -149,6 +153,8 @@ class _Reader:
         index = self._links[key]
         if index is None:
             return self._instead(found, asked, "is part of a circle of links")
+        if not gives(self.nodes[index], found.socket.identifier):
+            return self._instead(found, asked, f"does not give '{found.socket.name}'")
         return Link(index, found.socket.identifier)
 
     # Nodes
@@ -204,7 +210,16 @@ class _Reader:
             return self._plain(node, shown)
         self.images.setdefault(key)
         extra, options = self._properties(node)
+        # As in Cycles: a colour whose alpha goes nowhere is dark where it is transparent.
+        straight = any(s.identifier == "Alpha" and s.is_linked for s in node.outputs)
+        data = node.image.colorspace_settings.is_data
+        options.append(("alpha", "DATA" if data else "STRAIGHT" if straight else "TIMES"))
         return self._append(found, extra, options, image=list(self.images).index(key))
+
+    def constant(self, slot: Slot) -> Link:
+        """A link to a constant, for what takes links only."""
+        self.nodes.append(Node("Plain", (Input("Color", COLOR, slot),), (("Color", COLOR),)))
+        return Link(len(self.nodes) - 1, "Color")
 
     def _plain(self, node, rgb) -> int:
         """A node that gives one colour in all its outputs, and no transparency."""

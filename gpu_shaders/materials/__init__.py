@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from .code import Attribute
 from .generator import MaterialShader, generate
-from .node_code import is_supported, supported_kinds
+from .node_code import gives, is_supported, supported_kinds
 
-__all__ = ["Attribute", "MaterialShader", "generate", "is_supported", "supported_kinds"]
+__all__ = ["Attribute", "MaterialShader", "generate", "gives", "is_supported", "supported_kinds"]

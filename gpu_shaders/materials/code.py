@@ -16,7 +16,9 @@ POINT_FIELDS = {
     "generated": "vec3",
     "object_position": "vec3",
     "object_normal": "vec3",
-    "camera_position": "vec3",
+    "camera_position": "vec3",  # z grows away from the camera
+    "world_from_object": "mat4",
+    "camera_from_world": "mat4",
     "window": "vec3",
     "camera_ray": "float",
     "object_location": "vec3",
@@ -31,7 +33,7 @@ POINT_FIELDS = {
 
 @dataclass(frozen=True)
 class Attribute:
-    """An attribute of the mesh by name: a UV map, or a colour with alpha, vector or number ("": the active one)."""
+    """An attribute of the mesh by name: a UV map, or a colour with alpha, vector or number. "" means the active one."""
 
     field: str  # "uv" or "color"
     name: str

@@ -62,9 +62,7 @@ def generate(graph: NodeGraph, voronoi_float_hash: bool = False) -> MaterialShad
     writer = _Writer(_used(graph))
     for index, node in enumerate(graph.nodes):
         writer.add(index, node)
-    surface = (
-        f"n{graph.surface.node}_{_snake(graph.surface.output)}" if graph.surface else "surface_black(point.normal)"
-    )
+    surface = writer.expression(Input("Surface", SHADER, graph.surface))
     body = "\n".join(f"  {line}" for line in [*writer.lines, f"return {surface};"])
     needs = sorted({*_FIELD.findall(body), "normal"}, key=_order)
     fields = "".join(f"  {_field_type(name)} {name};\n" for name in needs)
@@ -109,14 +107,15 @@ class _Writer:
     def _words(self, node: Node, index: int, code: Code) -> Mapping[str, str]:
         words = {"v": f"n{index}", "table": str(node.table), "image": f"image_{node.image}_tx"}
         words |= {name: _option(value) for name, value in node.options}
-        words |= {given.name: self._input(given) for given in node.inputs}
+        words |= {given.name: self.expression(given) for given in node.inputs}
         for place, attribute in code.attributes.items():
             self.attributes.setdefault(attribute)
             number = list(self.attributes).index(attribute)
             words[place] = f"point.{attribute.field}_{number}"
         return words
 
-    def _input(self, given: Input) -> str:
+    def expression(self, given: Input) -> str:
+        """What an input takes, in its own type."""
         source = given.source
         if isinstance(source, Link):
             return _convert(f"n{source.node}_{_snake(source.output)}", self._types[source], given.type)
@@ -135,11 +134,13 @@ class _Writer:
 
 
 def _convert(expression: str, given: str, wanted: str) -> str:
-    """Blender's implicit conversions: a colour's luminance, a vector's mean, a number in every place."""
-    if given == wanted or FLOAT not in (given, wanted):
+    """Blender's implicit conversions: a colour's luminance, a vector's mean, a number thrice, a colour emitted."""
+    if given == wanted or {given, wanted} == {VECTOR, COLOR}:
         return expression
-    if wanted == SHADER or given == SHADER:
-        return "surface_black(point.normal)"
+    if wanted == SHADER:
+        return f"surface_emission({_convert(expression, given, COLOR)}, 1.0, point.normal)"
+    if given == SHADER:
+        return "0.0" if wanted == FLOAT else "vec3(0.0)"
     if given == FLOAT:
         return f"vec3({expression})"
     return f"color_gray({expression})" if given == COLOR else f"dot({expression}, vec3(1.0 / 3.0))"

@@ -14,6 +14,11 @@ def is_supported(kind: str) -> bool:
     return kind in _CODE
 
 
+def gives(node: Node, output: str) -> bool:
+    """Whether an output of a supported node can be expressed."""
+    return output in code_of(node).outputs
+
+
 def supported_kinds() -> tuple[str, ...]:
     """Every kind that can be, in the order of the table."""
     return tuple(_CODE)
@@ -47,7 +52,17 @@ _OBJECT = Code(
         "Random": "point.object_random",
     }
 )  # fmt: skip
-_LIGHT_PATH = Code({"Is Camera Ray": "point.camera_ray"})
+# What is not seen from the camera is lit diffusely: nothing else asks for a surface. Blocked light asks for none.
+_LIGHT_PATH = Code(
+    {
+        "Is Camera Ray": "point.camera_ray", "Ray Length": "length(point.camera_position)",
+        "Is Diffuse Ray": "1.0 - point.camera_ray", "Is Reflection Ray": "1.0 - point.camera_ray",
+        "Ray Depth": "1.0 - point.camera_ray", "Diffuse Depth": "1.0 - point.camera_ray",
+        **dict.fromkeys(("Is Shadow Ray", "Is Glossy Ray", "Is Singular Ray", "Is Transmission Ray"), "0.0"),
+        **dict.fromkeys(("Is Volume Scatter Ray", "Glossy Depth", "Transparent Depth", "Transmission Depth"), "0.0"),
+        "Portal Depth": "0.0",
+    }
+)  # fmt: skip
 
 
 def _uv_map(node: Node) -> Code:
@@ -68,6 +83,54 @@ def _attribute(node: Node) -> Code:
         "Fac": "dot({named}.rgb, vec3(1.0 / 3.0))",
     }
     return Code(outputs, attributes={"named": named})
+
+
+_CAMERA = Code(
+    {
+        "View Vector": "normalize(point.camera_position)",
+        "View Z Depth": "point.camera_position.z",
+        "View Distance": "length(point.camera_position)",
+    }
+)
+
+
+def _normal_map(node: Node) -> Code:
+    space, uv_map = str(node.option("space")), str(node.option("uv_map"))
+    color = "({Color} * vec3(1.0, -1.0, 1.0) + vec3(0.0, 1.0, 0.0))" if dict(node.options).get(
+        "convention") == "DIRECTX" else "{Color}"  # fmt: skip
+    if space == "TANGENT":
+        call = f"relief_tangent_map({color}, {{Strength}}, point.normal, point.position, {{map}})"
+        return Code({"Normal": call}, ("relief",), attributes={"map": Attribute("uv", uv_map)})
+    mapped = f"2.0 * {color} - 1.0"
+    if space.startswith("BLENDER"):
+        mapped = f"({mapped}) * vec3(1.0, -1.0, -1.0)"
+    if space.endswith("OBJECT"):
+        mapped = f"vector_transform_normal({mapped}, point.world_from_object)"
+    return Code({"Normal": f"relief_mixed({mapped}, {{Strength}}, point.normal)"}, ("relief", "vector"))
+
+
+def _bump(node: Node) -> Code:
+    distance = "-{Distance}" if node.option("invert") else "{Distance}"
+    call = f"relief_bump({{Height}}, {{Strength}}, {distance}, {{Normal}}, point.position)"
+    return Code({"Normal": call}, ("relief",))
+
+
+# Matrices to the world and from it; the camera's are of one length, so its inverse is cheap enough to leave to GLSL.
+_TO_WORLD = {"OBJECT": "point.world_from_object", "CAMERA": "inverse(point.camera_from_world)"}
+_FROM_WORLD = {"OBJECT": "inverse(point.world_from_object)", "CAMERA": "point.camera_from_world"}
+
+
+def _vector_transform(node: Node) -> Code:
+    kind, value = str(node.option("vector_type")), "{Vector}"
+    start, end = str(node.option("convert_from")), str(node.option("convert_to"))
+    for matrix in (_TO_WORLD.get(start), _FROM_WORLD.get(end)) if start != end else ():
+        if matrix:
+            value = {
+                "POINT": f"({matrix} * vec4({value}, 1.0)).xyz",
+                "VECTOR": f"mat3({matrix}) * ({value})",
+                "NORMAL": f"vector_transform_normal({value}, {matrix})",
+            }[kind]
+    return Code({"Vector": value}, ("vector",))
 
 
 # --- Shaders ---------------------------------------------------------------------------------------------------------
@@ -105,6 +168,8 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
     "ShaderNodeEmission": Code({"Emission": "surface_emission({Color}, {Strength}, point.normal)"}, ("surface",)),
     "ShaderNodeMixShader": Code({"Shader": "surface_mix({Shader}, {Shader_001}, {Fac})"}, ("surface",)),
     "ShaderNodeAddShader": Code({"Shader": "surface_add({Shader}, {Shader_001})"}, ("surface",)),
+    "ShaderNodeTexImage": texture_code.image,
+    "ShaderNodeTexEnvironment": texture_code.environment,
     "ShaderNodeTexNoise": texture_code.noise,
     "ShaderNodeTexVoronoi": texture_code.voronoi,
     "ShaderNodeTexWhiteNoise": texture_code.white_noise,
@@ -164,6 +229,10 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
     "ShaderNodeNewGeometry": _GEOMETRY,
     "ShaderNodeObjectInfo": _OBJECT,
     "ShaderNodeLightPath": _LIGHT_PATH,
+    "ShaderNodeCameraData": _CAMERA,
+    "ShaderNodeVectorTransform": _vector_transform,
+    "ShaderNodeNormalMap": _normal_map,
+    "ShaderNodeBump": _bump,
     "ShaderNodeUVMap": _uv_map,
     "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute,

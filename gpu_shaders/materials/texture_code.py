@@ -102,3 +102,28 @@ BRICK = Code(
     "PatternBrick {v}_b = pattern_brick({Vector} * {Scale}, {Mortar Size}, {Mortar Smooth}, {Bias}, {Brick Width}, "
     "{Row Height}, {offset}, int({offset_frequency}), {squash}, int({squash_frequency}));",
 )
+
+
+_FILTERS = {"Linear": 0, "Closest": 1, "Cubic": 2, "Smart": 2}
+_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
+_ALPHA = {"DATA": 0, "TIMES": 1, "STRAIGHT": 2}
+
+
+def image(node: Node) -> Code:
+    filtering, extension = _FILTERS[str(node.option("interpolation"))], _EXTENSIONS[str(node.option("extension"))]
+    modes, kind = f"{filtering}, {extension}, {_ALPHA[str(node.option('alpha'))]}", node.option("projection")
+    if kind == "BOX":
+        call = f"texture_box({{image}}, {{Vector}}, point.object_normal, {{projection_blend}}, {modes})"
+    elif kind == "FLAT":
+        call = f"texture_sample({{image}}, {{Vector}}.xy, {modes})"
+    else:
+        call = f"texture_sample({{image}}, texture_{str(kind).lower()}({{Vector}}), {modes})"
+    return Code({"Color": "{v}_i.rgb", "Alpha": "{v}_i.a"}, ("texture",), f"vec4 {{v}}_i = {call};")
+
+
+def environment(node: Node) -> Code:
+    place = "equirectangular" if node.option("projection") == "EQUIRECTANGULAR" else "mirror_ball"
+    filtering = _FILTERS[str(node.option("interpolation"))]
+    return Code(
+        {"Color": f"texture_sample({{image}}, texture_{place}({{Vector}}), {filtering}, 0, 0).rgb"}, ("texture",)
+    )

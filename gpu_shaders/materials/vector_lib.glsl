@@ -105,3 +105,9 @@ vec3 vector_mapping_normal(vec3 v, vec3 rotation, vec3 scale)
 {
   return vector_normalize(vector_euler(rotation) * vector_divide(v, scale));
 }
+
+/* A normal by the matrix that takes points there: it stays perpendicular. */
+vec3 vector_transform_normal(vec3 normal, mat4 matrix)
+{
+  return vector_normalize(transpose(inverse(mat3(matrix))) * normal);
+}

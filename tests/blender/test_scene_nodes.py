@@ -1,5 +1,8 @@
 """Reading node trees: groups, reroutes, muted nodes and links, circles, what is missing, and what is not supported."""
 
+import shutil
+import subprocess
+
 import bpy
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ import pytest
 from rebound.gpu_shaders.materials import generate
 from rebound.scene.node_graph import Link, Place, Slot
 from rebound.scene.node_reader import read_graph
+from rebound.tests.support.material_programs import material_program
 from rebound.tests.support.node_sheet import by_identifier, emit, new_material
 
 COLOR = (0.2, 0.4, 0.6, 1)
@@ -145,6 +149,16 @@ def test_unsupported_nodes_are_named_and_replaced(tree):
     assert isinstance(given["Color1"], Link) and found.values.ravel()[given["Fac"].index] == pytest.approx(0.3)
 
 
+def test_an_output_that_is_not_supported_is_named(tree):
+    geometry, mix = tree.nodes.new("ShaderNodeNewGeometry"), add(tree, "ShaderNodeMixRGB", Fac=0.3)
+    tree.links.new(geometry.outputs["Pointiness"], by_identifier(mix.inputs, "Fac"))
+    tree.links.new(geometry.outputs["Position"], by_identifier(mix.inputs, "Color1"))
+    emit(tree, mix.outputs[0])
+    found = read()
+    assert found.unsupported == ("node 'Geometry' does not give 'Pointiness', the socket's own value is shown",)
+    assert "point.position" in generate(found.graph).text
+
+
 def test_an_unsupported_shader_is_diffuse_of_its_colour(tree):
     toon, output = add(tree, "ShaderNodeBsdfToon", Color=COLOR), tree.nodes.new("ShaderNodeOutputMaterial")
     toon.name = "Toon"
@@ -173,6 +187,13 @@ def test_a_very_deep_tree_is_read(tree):
     assert len(found.graph.nodes) == 502 and not found.unsupported
 
 
+@pytest.mark.parametrize("kind", ["ShaderNodeRGB", "ShaderNodeTexNoise"])
+def test_a_colour_as_a_surface_is_emitted(tree, kind):
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(tree.nodes.new(kind).outputs["Color"], output.inputs["Surface"])
+    assert "return surface_emission(n0_color, 1.0, point.normal);" in generate(read().graph).text
+
+
 def test_nothing_linked_to_the_output_is_black(tree):
     tree.nodes.new("ShaderNodeOutputMaterial")
     assert read().graph.surface is None
@@ -181,10 +202,17 @@ def test_nothing_linked_to_the_output_is_black(tree):
 
 
 @pytest.mark.parametrize("file", ["sample_materials", "templates"])
-def test_real_materials_are_read_and_generated(clean_scene, shared_dir, file):
-    """Materials that artists made: each gives a shader, and those that differ in numbers only share one."""
+def test_real_materials_are_read_and_generated(clean_scene, shared_dir, tmp_path, file):
+    """Materials that artists made: each gives a shader that compiles."""
     with bpy.data.libraries.load(str(shared_dir / "scenes/nodes" / f"{file}.blend")) as (there, here):
         here.materials = there.materials
     found = [read_graph(material, lambda image, user: image.name) for material in bpy.data.materials]
-    assert found and all(generate(one.graph).text for one in found)
     assert sum(one.graph.surface is not None for one in found) > len(found) / 2
+    files = []
+    for one in {one.graph: one for one in found}.values():
+        files.append(tmp_path / f"{len(files)}.frag")
+        files[-1].write_text(material_program(generate(one.graph)).standalone_sources()["frag"])
+    assert files
+    if shutil.which("glslangValidator"):
+        answer = subprocess.run(["glslangValidator", *files], capture_output=True, text=True, check=False)
+        assert answer.returncode == 0, answer.stdout

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import bpy
+import numpy as np
 
 from rebound.gpu_shaders.materials import value_code
 
@@ -291,6 +292,82 @@ def table_cases():
             yield NodeCase(f"ShaderNode{kind}", output, place, low=-0.4, high=1.4, setup=_curve(extend))
 
 
+def _image(alpha=False):
+    def setup(node):
+        name = f"Image {alpha}"
+        image = bpy.data.images.get(name) or bpy.data.images.new(name, 5, 3, alpha=alpha, float_buffer=not alpha)
+        image.colorspace_settings.name = "Non-Color"
+        pixels = np.random.default_rng(3).random((15, 4)).astype(np.float32)
+        if not alpha:
+            pixels[:, 3] = 1.0
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+        node.image = image
+
+    return setup
+
+
+def image_cases():
+    range_of_places = {"low": -1.3, "high": 2.3}
+    for filtering, extension in itertools.product(
+        ("Linear", "Closest", "Cubic"), ("REPEAT", "EXTEND", "CLIP", "MIRROR")
+    ):
+        yield NodeCase(
+            "ShaderNodeTexImage",
+            "Color",
+            {"Vector": "a"},
+            {"interpolation": filtering, "extension": extension},
+            setup=_image(),
+            **range_of_places,
+        )
+    for projection in ("BOX", "SPHERE", "TUBE"):
+        yield NodeCase("ShaderNodeTexImage", "Color", {"Vector": "a"}, {"projection": projection}, setup=_image())
+    for output in ("Color", "Alpha"):
+        yield NodeCase("ShaderNodeTexImage", output, {"Vector": "a"}, setup=_image(alpha=True), **range_of_places)
+    for projection in ("EQUIRECTANGULAR", "MIRROR_BALL"):
+        yield NodeCase("ShaderNodeTexEnvironment", "Color", {"Vector": "a"}, {"projection": projection}, setup=_image())
+
+
+def _sloped(node):
+    """A height that grows evenly over the sheet."""
+    tree = node.id_data
+    place, slope = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeVectorMath")
+    slope.operation = "DOT_PRODUCT"
+    slope.inputs[1].default_value = (0.7, -0.4, 0.0)
+    tree.links.new(place.outputs["Object"], slope.inputs[0])
+    tree.links.new(slope.outputs["Value"], node.inputs["Height"])
+
+
+def relief_cases():
+    for strength in (1.0, 0.4, 1.6):
+        for space in ("TANGENT", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD"):
+            yield NodeCase(
+                "ShaderNodeNormalMap",
+                "Normal",
+                {"Color": "a", "Strength": strength},
+                {"space": space, "uv_map": "UV"},
+                low=0.1,
+                high=0.9,
+            )
+    for strength, invert in itertools.product((1.0, 0.4), (False, True)):
+        yield NodeCase(
+            "ShaderNodeBump",
+            "Normal",
+            {"Strength": strength, "Distance": 0.8},
+            {"invert": invert},
+            setup=_sloped,
+            flat=True,
+        )
+    spaces = ("WORLD", "OBJECT")
+    for kind, start, end in itertools.product(("POINT", "VECTOR", "NORMAL"), spaces, spaces):
+        yield NodeCase(
+            "ShaderNodeVectorTransform",
+            "Vector",
+            {"Vector": "a"},
+            {"vector_type": kind, "convert_from": start, "convert_to": end},
+        )
+
+
 GROUPS = {
     "noise": noise_cases,
     "voronoi": voronoi_cases,
@@ -298,4 +375,6 @@ GROUPS = {
     "numbers": number_cases,
     "vectors": vector_cases,
     "colors": color_cases,
+    "images": image_cases,
+    "relief": relief_cases,
 }

@@ -113,6 +113,8 @@ def sheet_mesh(cases):
     for name, value in values.items():
         layer = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
         layer.data.foreach_set("vector", np.concatenate(value).astype(np.float32).ravel())
+    uv = np.concatenate(points)[np.array(faces).ravel(), :2]
+    mesh.uv_layers.new(name="UV").uv.foreach_set("vector", uv.astype(np.float32).ravel())
     slots = np.repeat(np.arange(len(cases)), QUADS * QUADS)
     mesh.polygons.foreach_set("material_index", slots.astype(np.int32))
     mesh.update()
@@ -175,14 +177,30 @@ def value_texture(device, values):
     return device.texture((1024, rows), "RGBA32F", texels.reshape(rows, 1024, 4))
 
 
+def image_texture(device, image):
+    """A bpy image as it is, for images that need no conversion."""
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    return device.texture(tuple(image.size), "RGBA32F", pixels.reshape(image.size[1], image.size[0], 4))
+
+
+# What the sheet is like: it lies in the plane z = 0, a cell one metre wide, UV along its sides.
+POINT = {
+    "position": "vec3(uv, 0.0)",
+    "object_position": "vec3(uv, 0.0)",
+    "world_from_object": "mat4(1.0)",
+}
+
+
 def evaluate_material(device, material, a, b):
     """What the generated GLSL emits where the attributes are a and b, (h, w, 3) each: (h, w, 3) float32."""
-    read = read_graph(material, lambda image, user: None)
+    read = read_graph(material, lambda image, user: image.name)
     assert not read.unsupported, read.unsupported
     shader = generate(read.graph, voronoi_float_hash=bpy.app.version < (5, 0, 0))
-    given = {f"color_{k}": f"{named.name}_tx" for k, named in enumerate(shader.attributes)}
+    given = {f"color_{k}": f"{n.name}_tx" for k, n in enumerate(shader.attributes) if n.field == "color"}
+    point = POINT | {need: f"texelFetch({texture}, pixel, 0)" for need, texture in given.items()}
     fields = "".join(
-        f"  point.{need} = {f'texelFetch({given[need]}, pixel, 0)' if need in given else 'vec3(0.0, 0.0, 1.0)'};\n"
+        f"  point.{need} = {point.get(need, 'uv' if need.startswith('uv') else 'vec3(0.0, 0.0, 1.0)')};\n"
         for need in shader.needs
     )
     text = (
@@ -207,6 +225,7 @@ def evaluate_material(device, material, a, b):
     )
     result = device.texture((CELL, CELL), "RGBA32F")
     sent["value_tx"] = value_texture(device, read.values)
+    sent |= {f"image_{k}_tx": image_texture(device, bpy.data.images[str(name)]) for k, name in enumerate(read.images)}
     device.fullscreen(program, device.target([result]), pc_values=0, **sent)
     return device.read(result)[..., :3]
 

@@ -1,15 +1,14 @@
 """The generator of material shaders, on text: equal graphs share one, numbers are no part of it, needs are declared."""
 
-import re
 import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
-from rebound.device import Shader
 from rebound.gpu_shaders.materials import Attribute, generate, is_supported, supported_kinds
 from rebound.scene.node_graph import COLOR, FLOAT, SHADER, VECTOR, Input, Link, Node, NodeGraph, Place, Slot, Values
+from rebound.tests.support.material_programs import material_program
 
 NORMAL = Input("Normal", VECTOR, Place("normal"))
 
@@ -21,27 +20,6 @@ def diffuse(color) -> Node:
 
 def graph(*nodes, output="BSDF") -> NodeGraph:
     return NodeGraph(tuple(nodes), Link(len(nodes) - 1, output))
-
-
-def complete(shader):
-    """A whole program around the generated function."""
-    fields = "".join(f"  point.{need} = {point_value(shader, need)};\n" for need in shader.needs)
-    text = f"{shader.text}\nvoid main()\n{{\n  MaterialPoint point;\n{fields}"
-    text += "  out_value = vec4(material_surface(point).diffuse, 1.0);\n}\n"
-    return Shader(
-        "material_test",
-        fragment="test/material_frag.glsl",
-        files={"test/material_frag.glsl": text},
-        outputs={"out_value": "VEC4"},
-        samplers=shader.samplers,
-        constants={"pc_values": "INT"},
-        defines=shader.defines,
-    )
-
-
-def point_value(shader, need):
-    type = re.search(rf"(\w+) {need};", shader.text)[1]
-    return f"{type}(0.5)"
 
 
 def test_values_of_numbers_fill_the_texels_of_vectors():
@@ -111,7 +89,7 @@ def test_generated_text_passes_glslang(tmp_path):
         Input("Detail", FLOAT, Slot(1, FLOAT)), Input("Distortion", FLOAT, Slot(2, FLOAT)),
     ), (("Fac", FLOAT), ("Color", COLOR)),
         (("noise_dimensions", "3D"), ("noise_type", "FBM"), ("normalize", True)))  # fmt: skip
-    shader = complete(generate(graph(noise, diffuse(Link(0, "Color")))))
+    shader = material_program(generate(graph(noise, diffuse(Link(0, "Color")))))
     file = tmp_path / "material.frag"
     file.write_text(shader.standalone_sources()["frag"])
     answer = subprocess.run(["glslangValidator", file], capture_output=True, text=True, check=False)
