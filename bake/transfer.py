@@ -23,6 +23,8 @@ from .surfaces import Surfaces
 
 # Pairs of a vertex and a direction looked at in one piece: some tens of MB, and a fraction of a second by Embree.
 _PIECE = 262144
+# Rays that hit something, kept for the bounces: 1 GB. What goes beyond is traced again for each bounce.
+_KEPT = 50_000_000
 Result = TypeVar("Result")
 
 
@@ -48,7 +50,7 @@ class Sampling:
 class Blocked:
     """The rays of a run of vertices that hit something, in the order of the vertices."""
 
-    vertices: Array  # (n,) int64: row of Surfaces' vertex arrays
+    vertices: Array  # (n,) int32: row of Surfaces' vertex arrays
     directions: Array  # (n,) int32
     triangles: Array  # (n,) int32: row of Surfaces' triangles, -1 for the back of one: it blocks and reflects nothing
     u: Array  # (n,) float32
@@ -86,7 +88,7 @@ def trace(surfaces: Surfaces, caster: Caster, rows: Array, directions: Array, ne
     triangles = np.nonzero(surfaces.blocks)[0][found.triangles[hit]]
     front = (surfaces.facing[triangles] * towards[hit]).sum(axis=1) < 0
     triangles = np.where(front, triangles, -1).astype(np.int32)
-    return Blocked(rows[at[hit]], number[hit].astype(np.int32), triangles, found.u[hit], found.v[hit])
+    return Blocked(rows[at[hit]].astype(np.int32), number[hit].astype(np.int32), triangles, found.u[hit], found.v[hit])
 
 
 def shares(surfaces: Surfaces, blocked: Blocked, directions: Array) -> Array:
@@ -136,7 +138,8 @@ def diffuse(
     basis = sh.evaluate(directions, sampling.bands)
     passes = sampling.bounces + 1
     work = pieces(rows, sampling.directions)
-    kept: list[Blocked] = []
+    kept: list[Blocked | None] = []
+    room = _KEPT
     for done, piece in enumerate(work):
         yield Progress(done / len(work) / passes, "shadows")
         blocked = trace(surfaces, caster, piece, directions, sampling.bounces > 0)
@@ -144,14 +147,15 @@ def diffuse(
         place = np.searchsorted(piece, blocked.vertices), blocked.directions
         lost[place] = shares(surfaces, blocked, directions)
         first[piece] -= lost @ basis
-        if sampling.bounces:
-            kept.append(blocked)
+        room -= len(blocked.vertices)
+        kept.append(blocked if sampling.bounces and room >= 0 else None)
     direct = np.repeat(first[:, None, :], channels, axis=1).astype(np.float32)
     total = direct
     for bounce in range(sampling.bounces):
         following = direct.copy()
-        for done, (piece, blocked) in enumerate(zip(work, kept, strict=True)):
+        for done, (piece, found) in enumerate(zip(work, kept, strict=True)):
             yield Progress((bounce + 1 + done / len(work)) / passes, f"bounce {bounce + 1} of {sampling.bounces}")
+            blocked = found or trace(surfaces, caster, piece, directions, True)
             light = reflected(surfaces, blocked, total)
             light *= shares(surfaces, blocked, directions)[:, None, None]
             following[piece] += sum_by_vertex(light, blocked, piece)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rebound.bake import lobes, sh
+from rebound.bake import transfer as transfer_module
 from rebound.bake.occlusion import make_caster
 from rebound.bake.surfaces import gather
 from rebound.bake.transfer import Progress, Sampling, diffuse, finish
@@ -143,6 +144,13 @@ def test_same_input_gives_the_same_bits():
     scene = placed(grid("floor", 4.0, 4), sphere("ball", (0, 0, 0.6), 0.5, rings=6))
     one, other = (transfer_of(scene, bounces=1, directions=128)[1] for _ in range(2))
     assert one.tobytes() == other.tobytes()
+
+
+def test_rays_that_are_not_kept_are_traced_again_to_the_same_bits(monkeypatch):
+    scene = placed(grid("floor", 4.0, 4), sphere("ball", (0, 0, 0.6), 0.5, rings=6))
+    kept = transfer_of(scene, bounces=2, directions=2048)[1]
+    monkeypatch.setattr(transfer_module, "_KEPT", 20000)
+    assert transfer_of(scene, bounces=2, directions=2048)[1].tobytes() == kept.tobytes()
 
 
 def test_progress_rises_and_a_closed_bake_stops():
