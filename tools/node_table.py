@@ -55,7 +55,8 @@ def table(found: dict[str, list[tuple[NodeCase, float]]]) -> str:
         cases = found.get(kind, [])
         supported = "yes" if kind in supported_kinds() or kind in CONSTANTS else "**no**"
         largest = f"{max(value for _, value in cases):.0e}" if cases else ""
-        lines.append(f"| {label} | {supported} | {len(cases) or ''} | {largest} |")
+        reasons = "; ".join(dict.fromkeys(case.reason for case, _ in cases if case.reason))
+        lines.append(f"| {label} | {supported} | {len(cases) or ''} | {largest}{reasons and f' ({reasons})'} |")
     return "\n".join(lines) + "\n"
 
 

@@ -69,6 +69,22 @@ vec3 color_bright_contrast(vec3 c, float bright, float contrast)
   return max((1.0 + contrast) * c + bright - 0.5 * contrast, 0.0);
 }
 
+/* The colour of a black body of so many kelvin, its luminance 1: polynomials in 1000 / T fitted to what Cycles shows
+ * between 800 K and 12000 K, where it ends. The greatest channels' errors are 1e-3 of them. */
+vec3 color_blackbody(float kelvin)
+{
+  float T = clamp(kelvin, 800.0, 12000.0), x = 1000.0 / T;
+  float r = 0.677350412 +
+            x * (0.808709084 +
+                 x * (13.9671945 +
+                      x * (-29.8926653 + x * (40.5822466 + x * (-34.659396 + x * (16.333184 - x * 3.2146287))))));
+  float g = 0.954654972 + x * (0.885973944 + x * (-5.48587651 + x * (6.77525272 + x * (-4.1535618 + x * 1.06242785))));
+  float b =
+      2.27544409 +
+      x * (-7.8448523 + x * (-20.189279 + x * (184.614249 + x * (-495.379469 + x * (620.763047 - x * 307.158286)))));
+  return max(vec3(r, T < 965.0 ? 0.0 : g, T < 1905.0 ? 0.0 : b), 0.0);
+}
+
 /* Blend modes: a below, b above, t of b. */
 vec3 color_mix_mix(vec3 a, vec3 b, float t)
 {

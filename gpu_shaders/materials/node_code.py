@@ -210,6 +210,7 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
         {"Color": "color_adjust_hsv({Color}, {Hue}, {Saturation}, {Value}, {Fac})"}, ("color",)
     ),
     "ShaderNodeBrightContrast": Code({"Color": "color_bright_contrast({Color}, {Bright}, {Contrast})"}, ("color",)),
+    "ShaderNodeBlackbody": Code({"Color": "color_blackbody({Temperature})"}, ("color",)),
     "ShaderNodeRGBToBW": Code({"Val": "color_gray({Color})"}, ("color",)),
     "ShaderNodeSeparateColor": value_code.separate,
     "ShaderNodeCombineColor": value_code.combine,

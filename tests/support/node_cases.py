@@ -254,6 +254,7 @@ def color_cases():
     yield NodeCase("ShaderNodeBrightContrast", "Color", {"Color": "a", "Bright": 0.1, "Contrast": 0.4}, **place)
     yield NodeCase("ShaderNodeRGBToBW", "Val", {"Color": "a"}, **place)
     yield NodeCase("ShaderNodeSeparateXYZ", "X", {"Vector": "a.x"}, **place)
+    yield NodeCase("ShaderNodeBlackbody", "Color", {"Temperature": "a.x"}, low=700.0, high=14000.0)
     yield from table_cases()
 
 
@@ -324,6 +325,18 @@ def image_cases():
         yield NodeCase("ShaderNodeTexImage", "Color", {"Vector": "a"}, {"projection": projection}, setup=_image())
     for output in ("Color", "Alpha"):
         yield NodeCase("ShaderNodeTexImage", output, {"Vector": "a"}, setup=_image(alpha=True), **range_of_places)
+    # One side, two and three of a box, from both ends of its axes.
+    for tilt in (
+        (0.9, 0.1, 0.3),
+        (-0.9, 0.1, 0.3),
+        (0.1, 0.9, 0.3),
+        (0.1, -0.9, 0.3),
+        (0.6, 0.5, 0.2),
+        (-0.5, 0.4, 0.45),
+    ):
+        for blend in (0.0, 0.3, 1.0):
+            properties = {"projection": "BOX", "projection_blend": blend}
+            yield NodeCase("ShaderNodeTexImage", "Color", {"Vector": "a"}, properties, setup=_image(), tilt=tilt)
     for projection in ("EQUIRECTANGULAR", "MIRROR_BALL"):
         yield NodeCase("ShaderNodeTexEnvironment", "Color", {"Vector": "a"}, {"projection": projection}, setup=_image())
 

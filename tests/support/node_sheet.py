@@ -37,6 +37,7 @@ class NodeCase:
     tolerance: float = 1e-3
     reason: str = ""  # for another tolerance
     flat: bool = False  # the same all over: a limit, or a factor of 0
+    tilt: tuple[float, float, float] = (0.0, 0.0, 1.0)  # the cell's normal, not of unit length
 
     @property
     def name(self) -> str:
@@ -105,7 +106,8 @@ def sheet_mesh(cases):
     points, faces, values = [], [], {"a": [], "b": []}
     for k, case in enumerate(cases):
         faces += [[len(points) * len(grid) + i for i in quad] for quad in quads]
-        points.append(np.column_stack([grid + [k % columns, k // columns], np.zeros(len(grid))]))
+        heights = -(grid @ np.array(case.tilt[:2])) / case.tilt[2]
+        points.append(np.column_stack([grid + [k % columns, k // columns], heights]))
         for value in values.values():
             value.append(rng.uniform(case.low, case.high, (len(grid), 3)))
     mesh = bpy.data.meshes.new("Sheet")
@@ -130,7 +132,7 @@ def render_sheet(folder, cases, materials):
     link("Sheet", mesh)
     camera = bpy.data.cameras.new("Camera")
     camera.type, camera.ortho_scale = "ORTHO", max(columns, rows)
-    scene.camera = link("Camera", camera, location=(columns / 2, rows / 2, 5))
+    scene.camera = link("Camera", camera, location=(columns / 2, rows / 2, 50))
     pictures = []
     for place in ("a", "b"):
         made = new_material(place)
@@ -192,13 +194,18 @@ POINT = {
 }
 
 
-def evaluate_material(device, material, a, b):
+def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
     """What the generated GLSL emits where the attributes are a and b, (h, w, 3) each: (h, w, 3) float32."""
     read = read_graph(material, lambda image, user: image.name)
     assert not read.unsupported, read.unsupported
     shader = generate(read.graph, voronoi_float_hash=bpy.app.version < (5, 0, 0))
     given = {f"color_{k}": f"{n.name}_tx" for k, n in enumerate(shader.attributes) if n.field == "color"}
-    point = POINT | {need: f"texelFetch({texture}, pixel, 0)" for need, texture in given.items()}
+    normal = "normalize(vec3({}, {}, {}))".format(*tilt)
+    point = (
+        POINT
+        | {"object_normal": normal}
+        | {need: f"texelFetch({texture}, pixel, 0)" for need, texture in given.items()}
+    )
     fields = "".join(
         f"  point.{need} = {point.get(need, 'uv' if need.startswith('uv') else 'vec3(0.0, 0.0, 1.0)')};\n"
         for need in shader.needs
@@ -234,7 +241,10 @@ def deviations(device, folder, cases) -> list[float]:
     """The largest deviation of each case from Cycles, relative where the value is above 1; infinite if not a number."""
     materials = [case_material(case) for case in cases]
     a, b, expected = render_sheet(folder, cases, materials)
-    found = [evaluate_material(device, *given) for given in zip(materials, a, b, strict=True)]
+    found = [
+        evaluate_material(device, material, first, second, case.tilt)
+        for case, material, first, second in zip(cases, materials, a, b, strict=True)
+    ]
     largest = []
     for case, ours, theirs in zip(cases, found, expected, strict=True):
         assert np.isfinite(theirs).all(), case.name
