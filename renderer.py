@@ -7,28 +7,28 @@ can show progress, keep an interface alive, and cancel between two pieces.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .device.interface import Device, DrawState, Target, Texture
+from .frame import LIGHTS, Frame, new_frame
 from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.clock import Clock
 from .gpu_shaders.frame.direct import DirectLight
 from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
-from .gpu_shaders.frame.inputs import FrameInputs, GBuffer, LightTargets
+from .gpu_shaders.frame.inputs import FrameInputs
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
-from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, SUMS, accumulate
+from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, accumulate
 from .gpu_shaders.frame.views import (
     LAMPS,
     MOMENTS,
     SHOWN,
     UNBOUNCED,
     VIEWS,
-    Extras,
     draw_technique_view,
     draw_view,
     needed,
@@ -42,66 +42,10 @@ from .settings import Settings, shown_view
 GBUFFER_DONE, DIRECT_DONE, INDIRECT_DONE = 0.1, 0.4, 0.95
 
 ALL_PASSES = tuple(p.key for p in PASSES)
-WAYS = ("direct", "indirect")
-LIGHTS = tuple(field.name for field in fields(LightTargets))
-# Sums in one accumulation: as many as a GPU draws into at once.
-SUMS_A_PASS = 6
 
 
 class RenderError(RuntimeError):
     """A picture that cannot be rendered as asked; the message is one line for the user."""
-
-
-@dataclass(eq=False)
-class Frame:
-    """The running sum of one picture: ``samples`` of it so far."""
-
-    width: int
-    height: int
-    gbuffer: GBuffer
-    gbuffer_target: Target
-    background_target: Target  # what of the G-buffer means something where there is no surface
-    light: LightTargets
-    direct_target: Target  # both direct ones of ``light``
-    indirect_target: Target  # both indirect ones
-    sums: Mapping[str, Texture]  # those of SUMS that its passes need
-    sum_targets: Mapping[tuple[str, ...], Target]  # by the sums in their slots
-    geometry: tuple[Texture, ...]  # position and depth, normal: of the first sample; none where no pass needs them
-    geometry_target: Target | None
-    resolved: Texture
-    resolved_target: Target
-    extras: Extras  # what a view or the split wants beside all that
-    samples: int = 0
-    follows: bool = False  # whether it was restarted, not begun
-    provisional: bool = False  # whether the next sample begins anew, as the newest was made in haste
-    is_glossy: bool = False  # whether there may be something in the glossy targets
-
-    @property
-    def resources(self) -> tuple[Texture | Target, ...]:
-        """Everything to free: framebuffers before their textures."""
-        targets = (
-            self.gbuffer_target,
-            self.background_target,
-            *self._lights,
-            self.direct_target,
-            self.indirect_target,
-            *self.sum_targets.values(),
-            *((self.geometry_target,) if self.geometry_target else ()),
-            self.resolved_target,
-        )
-        textures = (
-            *self.gbuffer.colors,
-            self.gbuffer.depth,
-            *(target.colors[0] for target in self._lights),
-            *self.sums.values(),
-            *self.geometry,
-            self.resolved,
-        )
-        return (*targets, *textures)
-
-    @property
-    def _lights(self) -> tuple[Target, ...]:
-        return tuple(getattr(self.light, name) for name in LIGHTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +82,12 @@ class Renderer:
             raise RenderError(
                 f"A picture of {size[0]} x {size[1]} pixels is not possible: this GPU takes 1 to {largest} a side"
             )
-        return _new_frame(self.device, *size, passes)
+        return new_frame(self.device, *size, passes)
 
     def restart(self, frame: Frame) -> None:
         """Empty a frame for another picture of its size: much quicker than to begin one."""
         frame.samples = 0  # the next sample covers the sums
-        frame.follows, frame.provisional = True, False
+        frame.follows, frame.provisional, frame.is_resolved = True, False, False
 
     def sample(self, frame: Frame, gpu_scene: GpuScene, view: View, settings: Settings) -> Iterator[float]:
         """Add one anti-aliased sample to ``frame``; yields progress 0..1 after every bounded piece of GPU work.
@@ -184,13 +128,16 @@ class Renderer:
             self._show(frame, inputs, shown, settings, bounced)
         self.clock.mark("sum")
         self.clock.end()
+        frame.is_resolved = False
         yield 1.0
 
     def texture(self, frame: Frame) -> Texture:
         """RGBA32F mean of the picture so far, or of the view in its place; for the screen, until the next call."""
-        weight = 1.0 / frame.samples if frame.samples else 0.0
-        picture = frame.extras.texture(SHOWN) or frame.sums["combined"]
-        self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=picture, pc_weight=weight)
+        if not frame.is_resolved:  # a redraw where nothing changed has it already
+            weight = 1.0 / frame.samples if frame.samples else 0.0
+            picture = frame.extras.texture(SHOWN) or frame.sums["combined"]
+            self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=picture, pc_weight=weight)
+            frame.is_resolved = True
         return frame.resolved
 
     def unbounced(self, frame: Frame) -> Texture | None:
@@ -363,42 +310,3 @@ def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int, mark: Call
     world_from_view = np.linalg.inv(view.view_from_world)
     eye = (*world_from_view[:3, 3], 1.0) if view.is_perspective else (*world_from_view[:3, 2], 0.0)
     return FrameInputs(gpu_scene, frame.gbuffer, view, frame.samples, seed, eye, clip_from_world, frame.follows, mark)
-
-
-def _new_frame(device: Device, width: int, height: int, passes: Sequence[str]) -> Frame:
-    def texture(name: str) -> Texture:
-        return device.texture((width, height), name)
-
-    gbuffer = GBuffer(
-        albedo=texture("RGBA16F"),
-        emission=texture("RGBA32F"),
-        position=texture("RGBA32F"),
-        normal=texture("RGBA32F"),
-        specular=texture("RGBA16F"),
-        depth=texture("DEPTH32F"),
-    )
-    light = LightTargets(**{name: device.target([texture("RGBA32F")]) for name in LIGHTS})
-    direct, indirect = ([getattr(light, f"{kind}_{way}").colors[0] for kind in ("diffuse", "glossy")] for way in WAYS)
-    needs = {"combined"}.union(*(p.needs for p in PASSES if p.key in passes))
-    names = [name for name in SUMS if name in needs]
-    sums = {name: texture("RGBA32F") for name in names}
-    parts = [tuple(names[first : first + SUMS_A_PASS]) for first in range(0, len(names), SUMS_A_PASS)]
-    geometry = (texture("RGBA32F"), texture("RGBA32F")) if needs & {"position_depth", "normal"} else ()
-    resolved = texture("RGBA32F")
-    return Frame(
-        width,
-        height,
-        gbuffer,
-        device.target(gbuffer.colors, gbuffer.depth),
-        device.target([gbuffer.albedo, gbuffer.position], gbuffer.depth),
-        light,
-        device.target(direct),
-        device.target(indirect),
-        sums,
-        {part: device.target([sums[name] for name in part]) for part in parts},
-        geometry,
-        device.target(geometry) if geometry else None,
-        resolved,
-        device.target([resolved]),
-        Extras(device, (width, height)),
-    )

@@ -15,10 +15,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .device.blender import BlenderDevice
+from .frame import Frame
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame import DISPLAY, SPLIT
 from .gpu_shaders.technique import Setting, Value
-from .renderer import Frame, Renderer, RsmBuffers
+from .renderer import Renderer, RsmBuffers
 from .scene.changes import Changes
 from .scene.convert import convert_scene
 from .scene.data import Scene, View

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rebound.device import Device
+from rebound.frame import Frame
 from rebound.gpu_scene import GpuScene
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.passes import PASSES
-from rebound.renderer import ALL_PASSES, Frame, Renderer
+from rebound.renderer import ALL_PASSES, Renderer
 from rebound.scene.changes import Changes
 from rebound.scene.data import Scene, View
 from rebound.settings import SETTINGS, Settings, Value

@@ -20,19 +20,27 @@ Draws = list[tuple[float, float, object]]  # seconds of Python, seconds with the
 
 
 def note_draws() -> Draws:
+    """Time every draw. The call that brings the picture to the screen is no Python: software OpenGL draws within it."""
     draws: Draws = []
-    viewport = module("viewport").Viewport
-    draw = viewport.draw
+    viewport, device = module("viewport").Viewport, module("device.blender").BlenderDevice
+    draw, show = viewport.draw, device.draw_to_current
+    shown = []
+
+    def timed(self, *arguments, **resources):
+        start = time.perf_counter()
+        show(self, *arguments, **resources)
+        shown.append(time.perf_counter() - start)
 
     def noted(self, context, depsgraph):
+        shown.clear()
         start = time.perf_counter()
         draw(self, context, depsgraph)
-        python = time.perf_counter() - start
+        python = time.perf_counter() - start - sum(shown)
         if self.session._gpu is not None:
             self.session._gpu.device.finish()
         draws.append((python, time.perf_counter() - start, self.session._picture))
 
-    viewport.draw = noted
+    viewport.draw, device.draw_to_current = noted, timed
     return draws
 
 
