@@ -107,12 +107,16 @@ def bake_objects(
 ) -> Generator[Progress, None, dict[Hashable, Bake]]:
     """What the files of the objects ``keys`` hold. Closing the generator ends the bake.
 
-    The bounces of all are found together. Raises ValueError for a key that is not in the scene.
+    The bounces of all are found together. Raises ValueError for a key that is not in the scene or has
+    no surface.
     """
     by_key = {i.key: i for i in scene.instances}
     missing = [key for key in keys if key not in by_key]
     if missing:
         raise ValueError(f"the scene has no object {missing[0]!r}")
+    bare = [key for key in keys if not scene.meshes[by_key[key].mesh].triangle_count]
+    if bare:
+        raise ValueError(f"object {bare[0]!r} has no surface to bake")
     surfaces = gather(scene, frozenset(keys), settings.cuts if settings.bounces and settings.shadows else 0)
     caster = make_caster(surfaces.corners[surfaces.blocks], settings.rays)
     yield Progress(0.0, f"rays by {caster.name}")

@@ -96,6 +96,9 @@ def _targets(scene: Scene, wanted: Sequence[tuple[int, Path]]) -> dict[Hashable,
     wrong = [row for row, _ in wanted if not 0 <= row < len(scene.instances)]
     if wrong:
         raise ValueError(f"the scene has {len(scene.instances)} objects and none in row {wrong[0]}")
+    rows = [row for row, _ in wanted]
+    if len(set(rows)) < len(rows):
+        raise ValueError("a row is to be baked into two files: name each object once")
     return {scene.instances[row].key: path for row, path in wanted}
 
 

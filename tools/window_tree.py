@@ -26,6 +26,7 @@ PACKAGES = (
     *("libgl1-mesa-dri", "libegl1", "libegl-mesa0", "libglx-mesa0", "libopengl0", "mesa-vulkan-drivers"),
 )
 OLDEST = (4, 5)
+_WANTED = "Blender 4.5 or newer, Xvfb, xdotool and imagemagick"
 _MADE = "rebound-made.txt"  # in a tree that is complete: the packages that were asked for
 _SHARE = "/mnt"  # where a tree sees CACHE
 _ENTER = (
@@ -60,17 +61,23 @@ def find_place() -> Place:
     """This machine if it has all that is needed, else the tree, which is made first. Raises Unavailable."""
     if _is_complete_here():
         return Place(None)
+    if subprocess.run(["unshare", "--mount", "true"], capture_output=True).returncode != 0:
+        raise Unavailable(
+            f"no {_WANTED} here, and entering a Debian tree that has them needs the right to mount (root outside of a "
+            "restricted container)"
+        )
     if not _is_made(TREE):
         _make(TREE)
-    if subprocess.run(["unshare", "--mount", "true"], capture_output=True).returncode != 0:
-        raise Unavailable("entering the Debian tree needs the right to mount (root outside of a restricted container)")
     return Place(TREE)
 
 
 def _is_complete_here() -> bool:
     if not all(shutil.which(program) for program in ("blender", "Xvfb", "xdotool", "import", "convert")):
         return False
-    answer = subprocess.run(["blender", "--version"], capture_output=True, text=True, timeout=60)
+    try:
+        answer = subprocess.run(["blender", "--version"], capture_output=True, text=True, timeout=60)
+    except subprocess.TimeoutExpired:
+        return False
     found = re.search(r"Blender (\d+)\.(\d+)", answer.stdout)
     return found is not None and tuple(map(int, found.groups())) >= OLDEST
 
@@ -83,8 +90,7 @@ def _is_made(tree: Path) -> bool:
 def _make(tree: Path) -> None:
     """Unpack Debian with Blender into ``tree``. Raises Unavailable in one line where that cannot be."""
     if os.geteuid() != 0 or not shutil.which("apt-get"):
-        wanted = "Blender 4.5 or newer, Xvfb, xdotool and imagemagick"
-        raise Unavailable(f"no {wanted} here, and only root on a Debian machine can unpack a tree with them")
+        raise Unavailable(f"no {_WANTED} here, and only root on a Debian machine can unpack a tree with them")
     if not shutil.which("debootstrap"):
         try:
             system_libraries.require(["debootstrap"])

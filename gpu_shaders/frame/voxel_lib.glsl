@@ -76,7 +76,7 @@ float voxel_trace_grid(VoxelPlace place, vec3 origin, vec3 slope, vec3 inverse, 
     ivec3 high = min(low + ((ivec3(1) << shift) - 1), highest);
     vec3 ends = (vec3(low + (forward << shift)) - start) * inverse;
     t = min(ends.x, min(ends.y, ends.z));
-    if (t >= last) { /* the grid's own end as well: it is computed alike */
+    if (!(t < last)) { /* the grid's own end as well: it is computed alike. Nor may a t that is no number go on */
       break;
     }
     ivec3 inside = clamp(ivec3(floor(start + t * slope)), low, high);

@@ -80,6 +80,7 @@ class Vpl:
             yield MAPS_DONE * done
         inputs.mark("light maps")
         if not self.sources.tiles:
+            self.gathering.forget()  # or light of before the last lamp went would be waited for without end
             return
         for done in self.voxels.update(gpu_scene, int(settings["voxels"])):
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done

@@ -26,8 +26,8 @@ ROUNDS = 4
 # Before a picture that follows none the cache is updated until so much of all light is left that goes on, and within
 # these limits: each update takes light a bounce further.
 LEFT, LEAST_WARM_UP, MOST_WARM_UP = 0.02, 4, 48
-# So many times as often after an edit: LEFT of a light that went out may be more than all that is lit now.
-AFTER_EDIT = 2
+# After an edit so many times as often, within a limit: LEFT of a light that went out may be more than all that is lit.
+AFTER_EDIT, MOST_AFTER_EDIT = 2, 24
 # Where light goes on, a point forgets its updates until all bounces can be in them; then its mean is of this newer
 # part of them.
 NEWER = 0.5
@@ -57,7 +57,7 @@ class Cache:
             if self._revision < 0:
                 rounds = bounces
             else:
-                bounces *= AFTER_EDIT
+                bounces = min(AFTER_EDIT * bounces, MOST_AFTER_EDIT)
             self._revision, self._updates = gpu_scene.revision, float(1 - bounces)
         self._counts = NEWER if many else 1.0
         return rounds, POINTS_SIDE if self.settles else rows
@@ -96,9 +96,9 @@ class Cache:
     ) -> None:
         """Gather at the points of the next ``rows`` rows."""
         place = sources.points_viewport(tile)
-        rows = min(rows, place[3])
-        if self._next_row + rows > place[3]:
+        if rows >= place[3] or self._next_row >= place[3]:
             self._next_row = 0
+        rows = min(rows, place[3] - self._next_row)
         self._sums.reverse()
         (_, target), (old, _) = self._sums
         most = ROUNDS * max(self._updates, 0.0) * self._counts
@@ -114,7 +114,7 @@ class Cache:
             pc_origin=place[:2],
         )
         self._next_row += rows
-        self._updates += rows / POINTS_SIDE
+        self._updates += rows / place[3]
 
     def forget(self) -> None:
         """Begin anew: the points are others, or the picture follows none."""

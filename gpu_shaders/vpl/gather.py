@@ -140,6 +140,7 @@ class Gathering:
         self._grid: _Grid | None = None
         self._before: _Before | None = None
         self._drawn: _Before | None = None  # the newest picture, reused or not
+        self._whole = True  # whether the newest sample came to its end
         self._settling = 0  # samples to come whose mean stays short
 
     def draw(
@@ -184,6 +185,7 @@ class Gathering:
             self._reflect(inputs, settings, candidates, grid, now, targets)
             inputs.mark("reflect")
         self._before, self._drawn = now if reuses else None, now
+        self._whole = True
 
     @property
     def settles(self) -> bool:
@@ -338,7 +340,9 @@ class Gathering:
         if self._grid is None or (self._grid.size, self._grid.first_hand) != (size, first_hand):
             self.free()
             self._grid = _new_grid(self.device, size, first_hand)
-        self._grid.turn()
+        if self._whole:  # what a cancelled sample left is written over: the picture before is still the older
+            self._grid.turn()
+        self._whole = False
         return self._grid
 
 

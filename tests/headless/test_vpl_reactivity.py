@@ -135,6 +135,26 @@ def test_still_viewport_keeps_nothing_of_a_far_brighter_light(studio):
     assert dim * 300 == pytest.approx(bright, rel=0.1)
 
 
+def test_picture_without_lights_is_waited_for_once(studio):
+    """The only lamp moves and is deleted while the picture still settles."""
+    settings = Settings.defaults(**{**QUICK, **VPL, "vpl_reuse": True})
+    frame = studio.renderer.begin(VIEW, ("combined",))
+    for lamps in (LAMPS[:1], LAMPS[1:2], []):
+        studio.show(picture(lamps))
+        studio.renderer.restart(frame)
+        for _ in studio.renderer.sample(frame, studio.gpu_scene, VIEW, settings):
+            pass
+    assert not frame.provisional
+    studio.renderer.free_frame(frame)
+
+
+def test_cache_gathers_in_all_rows_whatever_their_number_at_once(studio):
+    gathered(studio, picture(), VIEW, 12, vpl_bounces="MANY", vpl_reuse=True, vpl_cache_rows=48)
+    sums = studio.device.read(studio.renderer._techniques["vpl"].cache._sums[0][0])[..., 3]
+    rounds = sums.max(axis=1)
+    assert rounds.min() > 0.5 * rounds.max()
+
+
 def test_cache_forgets_when_its_points_are_others(studio):
     """A wall comes into a lit room, with few updates of the cache a sample."""
     lamp = light("POINT", (-0.5, 0.2, 0.1))
