@@ -57,6 +57,8 @@ class _FinalRender:
         self.passes = wanted_passes(depsgraph.view_layer)
 
     def run(self) -> None:
+        if self.depsgraph.scene.render.use_multiview and not self.engine.is_preview:
+            raise RenderError("Stereo and multi-view are not rendered yet: switch Output > Stereoscopy off")
         self.engine.update_stats("", "Reading the scene")
         try:
             self.session.sync(self.depsgraph, for_viewport=False, on_main_thread=self._on_main_thread)

@@ -45,13 +45,13 @@ def _row(setting: Setting, name: str) -> str:
     if setting.viewport_default is not None:
         default += f" / {_value(setting, setting.viewport_default)}"
     unit = f" Unit: {setting.unit}." if setting.unit else ""
-    choices = "".join(f"<br>**{item.label}**{_owner(item)}: {item.description}." for item in setting.items)
+    choices = "".join(f"<br>**{item.label}** (`{item.key}`{_owner(item)}): {item.description}." for item in setting.items)
     return f"| {setting.label} | `{name}` | {default} | {setting.description}.{unit}{choices} |"
 
 
 def _owner(item: Item) -> str:
     """Which method has a view, where not all have it."""
-    return next((f" ({t.label})" for t in TECHNIQUES if any(view.key == item.key for view in t.views)), "")
+    return next((f", {t.label}" for t in TECHNIQUES if any(view.key == item.key for view in t.views)), "")
 
 
 def _value(setting: Setting, value: Value) -> str:

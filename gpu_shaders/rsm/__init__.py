@@ -61,7 +61,7 @@ SETTINGS = (
             Item(
                 "ALL_TEXELS",
                 "All Texels",
-                "Every texel of every map: no noise at all, at the cost of many times the time",
+                "Every texel of every map: no noise at all, at the cost of hundreds of times the time",
             ),
         ),
     ),

@@ -15,8 +15,8 @@ void main()
     return;
   }
   vec3 hit = origin + (reach + 0.01 * voxel_grid.edge) * direction;
-  VoxelPlace place = voxel_place_at(hit);
-  ivec3 voxel = ivec3(floor((hit - place.origin) / place.edge));
+  VoxelPlace grid = voxel_place_at(hit);
+  ivec3 voxel = ivec3(floor((hit - grid.origin) / grid.edge));
   float grey = 0.5 + 0.5 * sampling_hash(voxel.xy, voxel.z).x;
   float size = voxel_grid.edge * max(voxel_grid.size.x, max(voxel_grid.size.y, voxel_grid.size.z));
   out_color.rgb = vec3(grey * size / (size + reach));

@@ -43,6 +43,11 @@ def test_camera_that_is_no_camera_is_an_error(rebound_scene, tmp_path):
     assert_fails(rebound_scene, tmp_path / "a.exr", "camera")
 
 
+def test_stereo_is_an_error(rebound_scene, tmp_path):
+    rebound_scene.render.use_multiview = True
+    assert_fails(rebound_scene, tmp_path / "a.exr", "Stereo and multi-view are not rendered yet")
+
+
 @pytest.mark.parametrize("scale", [(0, 0, 0), (1, 0, 1)])
 def test_flat_camera_is_an_error(rebound_scene, tmp_path, scale):
     rebound_scene.camera.scale = scale
