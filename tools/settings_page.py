@@ -45,7 +45,9 @@ def _row(setting: Setting, name: str) -> str:
     if setting.viewport_default is not None:
         default += f" / {_value(setting, setting.viewport_default)}"
     unit = f" Unit: {setting.unit}." if setting.unit else ""
-    choices = "".join(f"<br>**{item.label}** (`{item.key}`{_owner(item)}): {item.description}." for item in setting.items)
+    choices = "".join(
+        f"<br>**{item.label}** (`{item.key}`{_owner(item)}): {item.description}." for item in setting.items
+    )
     return f"| {setting.label} | `{name}` | {default} | {setting.description}.{unit}{choices} |"
 
 
