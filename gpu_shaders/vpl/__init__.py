@@ -146,9 +146,7 @@ class Vpl:
             update = MOST_WARM_UP * self._picture + number
             self.pool.draw(self.sources, count, update, seed)
             candidates = self._candidates(inputs, settings, kinds=kinds, number=update)
-            comes_to_light = self.cache.comes_to_light
-            self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy)
-            if comes_to_light:
+            if self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy):
                 self.cache.emit(self.sources, tile)
                 self._sort_points(CACHE)
             yield (number + 1) / rounds

@@ -6,6 +6,7 @@ Each update takes light one bounce further, with the surfaces' reflectance, belo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -67,11 +68,6 @@ class Cache:
         """Whether light of before the newest edit is left, or some of the bounces after it are still to come."""
         return self._updates <= 0.0
 
-    @property
-    def comes_to_light(self) -> bool:
-        """Whether the next update may give light to points that had none."""
-        return self._updates < COME_TO_LIGHT
-
     def emit(self, sources: Sources, tile: MapTile) -> None:
         """Write what every point reflects into the atlas."""
         if not self._sums:
@@ -93,8 +89,8 @@ class Cache:
 
     def gather(
         self, sources: Sources, tile: MapTile, candidates: Mapping[str, Any], rows: int, *, glossy: bool
-    ) -> None:
-        """Gather at the points of the next ``rows`` rows."""
+    ) -> bool:
+        """Gather at the points of the next ``rows`` rows; True if points that had no light may have some now."""
         place = sources.points_viewport(tile)
         if rows >= place[3] or self._next_row >= place[3]:
             self._next_row = 0
@@ -114,7 +110,8 @@ class Cache:
             pc_origin=place[:2],
         )
         self._next_row += rows
-        self._updates += rows / place[3]
+        before, self._updates = self._updates, self._updates + rows / place[3]
+        return before < COME_TO_LIGHT and math.floor(self._updates) > math.floor(before)
 
     def forget(self) -> None:
         """Begin anew: the points are others, or the picture follows none."""
