@@ -27,7 +27,6 @@ LIGHT_HEIGHT = 4.0
 TOTAL_POWER = 4000.0  # watts, however many lights share it
 BASE_TRIANGLES, BASE_INSTANCES, BASE_LIGHTS = 2048, 24, 4
 BASE_SIZE = (320, 180)
-BLOCK_TRIANGLES = 12
 
 
 @dataclass(frozen=True)

@@ -222,14 +222,19 @@ def shown_label(group, name: str) -> str:
     return group.bl_rna.properties[name].enum_items[key].name
 
 
-class REBOUND_PT_light_shadow(ReboundPanel, bpy.types.Panel):
-    bl_label = "Influence"
+class LightPanel(ReboundPanel):
+    """Mixin: a panel below Blender's own of a light."""
+
     bl_context = "data"
     bl_parent_id = "DATA_PT_EEVEE_light"
 
     @classmethod
     def poll(cls, context):
         return context.light is not None and super().poll(context)
+
+
+class REBOUND_PT_light_shadow(LightPanel, bpy.types.Panel):
+    bl_label = "Influence"
 
     def draw(self, context):
         layout = self.layout
@@ -239,16 +244,10 @@ class REBOUND_PT_light_shadow(ReboundPanel, bpy.types.Panel):
         layout.prop(context.light, "specular_factor", text="Specular")
 
 
-class REBOUND_PT_light_bounce(ReboundPanel, bpy.types.Panel):
+class REBOUND_PT_light_bounce(LightPanel, bpy.types.Panel):
     """The switch in the header; what it switches below."""
 
     bl_label = "Bounce"
-    bl_context = "data"
-    bl_parent_id = "DATA_PT_EEVEE_light"
-
-    @classmethod
-    def poll(cls, context):
-        return context.light is not None and super().poll(context)
 
     def draw_header(self, context):
         self.layout.prop(context.light.rebound, "use_bounce", text="")

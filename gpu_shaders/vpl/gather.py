@@ -248,13 +248,14 @@ class Gathering:
         if before is not None:
             still = inputs.sample > 0
             edited = before.scene_revision != now.scene_revision
-            settled = self._settling == 0
-            left = SETTLING if edited else max(self._settling - 1, 0)
-            self._settling = max(left, 1) if left or (pool_settles and not settled) else 0
+            settled_before = self._settling == 0
+            # Once begun, it lasts as long as the cache's.
+            least = 1 if pool_settles and not settled_before else 0
+            self._settling = SETTLING if edited else max(self._settling - 1, least)
             history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
             # Samples of a still view are to be independent, or their mean would converge more slowly.
             reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
-            if self._settling == 0 and not settled:
+            if self._settling == 0 and not settled_before:
                 history = reuse = 0.0
         direct: dict[str, Texture] = {}
         if grid.first_hand:
@@ -306,7 +307,7 @@ class Gathering:
                 grid.noisy_targets[1 - newest],
                 surface_tx=grid.surfaces[0],
                 light_tx=grid.noisy[newest],
-                **dict(zip(("direct_tx",), direct, strict=False)),
+                **({"direct_tx": direct[0]} if direct else {}),
                 pc_step=step,
             )
             newest = 1 - newest
