@@ -302,12 +302,13 @@ class Gathering:
         """All light, and the part of it that is direct."""
         newest, direct = 0, grid.direct_histories[:1]
         for step in FILTER_STEPS:
+            direct_input: dict[str, Any] = {"direct_tx": direct[0]} if direct else {}
             self.device.fullscreen(
                 ATROUS[grid.first_hand],
                 grid.noisy_targets[1 - newest],
                 surface_tx=grid.surfaces[0],
                 light_tx=grid.noisy[newest],
-                **({"direct_tx": direct[0]} if direct else {}),
+                **direct_input,
                 pc_step=step,
             )
             newest = 1 - newest

@@ -82,7 +82,9 @@ def test_an_unknown_kind_is_not_supported():
         generate(graph(Node("ShaderNodeScript", (), (("BSDF", SHADER),))))
 
 
-@pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)")
+@pytest.mark.skipif(
+    shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)"
+)
 def test_generated_text_passes_glslang(tmp_path):
     noise = Node("ShaderNodeTexNoise", (
         Input("Vector", VECTOR, Place("generated")), Input("Scale", FLOAT, Slot(0, FLOAT)),
