@@ -11,7 +11,7 @@ import numpy as np
 from .device.interface import Device, Texture, Vertices
 from .gpu_shaders.frame.structs import IMAGE_CLOSEST, IMAGE_EXTEND, INSTANCE, MATERIAL
 from .gpu_shaders.frame.tables import replace_table
-from .scene.changes import Changes, world_bounds
+from .scene.changes import Changes, world_boxes
 from .scene.data import Image, Instance, Material, Mesh, Scene, Visibility
 from .scene.data import Texture as ImageLookup
 
@@ -142,7 +142,7 @@ class GpuScene:
         draws, matrices, every_box, wanted = [], [], [], set()
         for (mesh_key, materials, visibility), members in groups.items():
             mesh = scene.meshes[mesh_key]
-            boxes = np.array([world_bounds(member, scene) for member in members])
+            boxes = world_boxes(members, scene)
             every_box.append(boxes)
             bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
             for slot, first, count in mesh.slots:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -83,6 +83,11 @@ def _order(scene: Scene) -> list[Hashable]:
 
 def _pair_instances(old: Scene, new: Scene) -> Iterator[tuple[Instance | None, Instance | None]]:
     """Pair the instances of two scenes by key; the missing partner is None."""
+    if len(old.instances) == len(new.instances):  # as nearly always: the same ones in the same order
+        pairs = tuple(zip(old.instances, new.instances, strict=True))
+        if all(a is b or a.key == b.key for a, b in pairs):
+            yield from pairs
+            return
     remaining = {instance.key: instance for instance in old.instances}
     for instance in new.instances:
         yield remaining.pop(instance.key, None), instance
@@ -91,6 +96,8 @@ def _pair_instances(old: Scene, new: Scene) -> Iterator[tuple[Instance | None, I
 
 
 def _same_instance(a: Instance | None, b: Instance | None) -> bool:
+    if a is b:
+        return True
     if a is None or b is None:
         return False
     return _same_place(a, b) and a.materials == b.materials and a.visibility == b.visibility
@@ -122,19 +129,30 @@ def _same_light(a: Light, b: Light) -> bool:
 def _moved_bounds(
     old: Scene, new: Scene, pairs: tuple[tuple[Instance | None, Instance | None], ...]
 ) -> tuple[Array, Array]:
-    boxes, of_shape = [], []
+    places: tuple[list[Instance], list[Instance]] = [], []
+    of_shape: tuple[list[bool], list[bool]] = [], []
+    recoloured = _recoloured(old, new)
     for a, b in pairs:
+        if a is b and a is not None and recoloured.isdisjoint(a.materials):
+            continue
         same_shape = a is not None and b is not None and _same_place(a, b)
         if same_shape and _same_look(a, b, old, new):
             continue
-        if a is not None and a.mesh in old.meshes:
-            boxes.append(world_bounds(a, old))
-            of_shape.append(not same_shape)
-        if b is not None and b.mesh in new.meshes:
-            boxes.append(world_bounds(b, new))
-            of_shape.append(not same_shape)
-    moved = np.array(boxes, np.float64).reshape(-1, 2, 3)
-    return moved, moved[np.array(of_shape, bool)]
+        for side, instance, scene in ((0, a, old), (1, b, new)):
+            if instance is not None and instance.mesh in scene.meshes:
+                places[side].append(instance)
+                of_shape[side].append(not same_shape)
+    moved = np.concatenate([world_boxes(places[0], old), world_boxes(places[1], new)])
+    return moved, moved[np.array([*of_shape[0], *of_shape[1]], bool)]
+
+
+def _recoloured(old: Scene, new: Scene) -> set[int]:
+    """The places in both tables of materials whose material differs."""
+    if old.materials is new.materials:
+        return set()
+    both = zip(old.materials, new.materials, strict=False)
+    beyond = range(min(len(old.materials), len(new.materials)), max(len(old.materials), len(new.materials)))
+    return {index for index, (a, b) in enumerate(both) if a is not b and a != b} | set(beyond)
 
 
 def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:
@@ -148,8 +166,15 @@ def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:
 
 def world_bounds(instance: Instance, scene: Scene) -> Array:
     """The world-space box of an instance: (2, 3) float64, of its object-space box's eight corners."""
-    bounds = np.asarray(scene.meshes[instance.mesh].bounds, np.float64)
-    matrix = instance.world_from_object
-    center = matrix[:3, :3] @ bounds.mean(axis=0) + matrix[:3, 3]
-    half = np.abs(matrix[:3, :3]) @ (bounds[1] - bounds[0]) * 0.5
-    return np.stack((center - half, center + half))
+    return world_boxes([instance], scene)[0]
+
+
+def world_boxes(instances: Sequence[Instance], scene: Scene) -> Array:
+    """The same of n instances: (n, 2, 3)."""
+    if not instances:
+        return _no_boxes()
+    bounds = np.array([scene.meshes[instance.mesh].bounds for instance in instances], np.float64)
+    matrices = np.array([instance.world_from_object for instance in instances], np.float64)[:, :3]
+    center = np.einsum("nij,nj->ni", matrices[..., :3], bounds.mean(axis=1)) + matrices[..., 3]
+    half = np.einsum("nij,nj->ni", np.abs(matrices[..., :3]), bounds[:, 1] - bounds[:, 0]) * 0.5
+    return np.stack((center - half, center + half), axis=1)

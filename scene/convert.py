@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import cache
 
 import numpy as np
 
@@ -27,6 +28,23 @@ def _receives_bounce(obj) -> bool:
     return own is None or bool(own.receive_bounce)
 
 
+def _says(layer_collection, name: str) -> bool:
+    """Whether a collection of a view layer, or one in it, has this switch on."""
+    return getattr(layer_collection, name) or any(_says(child, name) for child in layer_collection.children)
+
+
+@cache
+def _visibility(camera: bool, shadow: bool, bounce: bool, holdout: bool, receives: bool) -> Visibility:
+    flags = Visibility(0)
+    for wanted, flag in ((camera, Visibility.CAMERA), (shadow, Visibility.SHADOW), (bounce, Visibility.BOUNCE)):
+        flags |= flag if wanted else Visibility(0)
+    if holdout and camera:
+        flags |= Visibility.HOLDOUT
+    if flags and not receives:
+        flags |= Visibility.NO_INDIRECT
+    return flags
+
+
 def _here(call: Callable[[], object]) -> object:
     return call()
 
@@ -47,14 +65,25 @@ def convert_scene(
     and returns its result: needed where this runs on another one, since a sequence's frames are read through
     data-blocks. What cannot be read stands in Scene.warnings; nothing is raised for it.
     """
-    reader = _SceneReader(depsgraph, for_viewport, previous or Scene(), visible, on_main_thread)
-    for instance in depsgraph.object_instances:
-        reader.add(instance)
+    reader = SceneReader(depsgraph, for_viewport, previous or Scene(), visible, on_main_thread)
+    reader.add_all()
     return reader.scene()
 
 
-class _SceneReader:
-    """Collects one scene while the depsgraph's instances go by; nothing of Blender's is kept past one of them."""
+def instance_matrices(depsgraph) -> Array:
+    """World matrices of all of depsgraph.object_instances, (n, 4, 4) float32: ten times quicker than one by one."""
+    items = depsgraph.object_instances
+    columns = np.empty(16 * len(items), np.float32)
+    items.foreach_get("matrix_world", columns)
+    return columns.reshape(-1, 4, 4).transpose(0, 2, 1)
+
+
+class SceneReader:
+    """Collects one scene while the depsgraph's instances go by; nothing of Blender's is kept past one of them.
+
+    ``rows`` tells of each item of depsgraph.object_instances what became of it: the number of its Instance, or ~number
+    of its Light, None where nothing did.
+    """
 
     def __init__(self, depsgraph, for_viewport, previous, visible, on_main_thread):
         self.depsgraph = depsgraph
@@ -66,59 +95,89 @@ class _SceneReader:
         self.images = ImageReader(previous.images, self.warn, on_main_thread)
         self.materials = MaterialTable(self.images, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
+        self.read_by_uid: dict[int, Mesh] = {}  # those of evaluated data-blocks, which many instances share
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.keys: set[Hashable] = set()
+        self.rows: list[int | None] = []
+        self.before = {instance.key: instance for instance in previous.instances}
+        # Asked of every object only where some collection says so: a third of the time of reading an object.
+        self.layers_hold_out = _says(self.view_layer.layer_collection, "holdout")
+        self.layers_hide = _says(self.view_layer.layer_collection, "indirect_only")
 
     def warn(self, line: str) -> None:
         self.warnings[line] = None
 
-    def add(self, instance) -> None:
+    def add_all(self) -> None:
+        """Take in all of depsgraph.object_instances."""
+        matrices = instance_matrices(self.depsgraph).astype(np.float64)
+        fine = np.abs(matrices).max((1, 2), initial=0.0) < FARTHEST  # false for NaN
+        for row, instance in enumerate(self.depsgraph.object_instances):
+            self.rows.append(None)
+            if instance.show_self:
+                self.add(instance, row, matrices[row], bool(fine[row]))
+
+    def add(self, instance, row: int, matrix: Array, is_finite: bool) -> None:
         """Take in one item of depsgraph.object_instances."""
         obj = instance.object
-        if not instance.show_self:
-            return
+        kind = obj.type
         # A curve, text, surface or metaball comes a second time, as an instance of its evaluated mesh.
-        if obj.type not in {"MESH", "LIGHT"}:
-            if obj.type in UNSHOWN_TYPES:
-                self.warn(f"Object '{obj.name}': {UNSHOWN_TYPES[obj.type]} are not shown yet")
+        if kind not in {"MESH", "LIGHT"}:
+            if kind in UNSHOWN_TYPES:
+                self.warn(f"Object '{obj.name}': {UNSHOWN_TYPES[kind]} are not shown yet")
             return
         parent = instance.parent if instance.is_instance else obj
         if self.visible is not None and not self.visible(parent.original):
             return
-        matrix = np.array(instance.matrix_world, np.float64)
-        if not np.abs(matrix).max() < FARTHEST:  # false for NaN
+        if not is_finite:
             self.warn(f"Object '{obj.name}': its transform is not finite or too large; it is left out")
             return
         key = self._unique_key(instance, obj, parent)
-        if obj.type == "LIGHT":
-            lights = {
-                "diffuse": obj.visible_diffuse and parent.visible_diffuse,
-                "glossy": obj.visible_glossy and parent.visible_glossy,
-            }
-            light = read_light(obj, matrix, key, lights, self.warn)
+        if kind == "LIGHT":
+            light = self.light(obj, parent, matrix, key)
             if light is not None:
+                self.rows[row] = ~len(self.lights)
                 self.lights.append(light)
             return
-        self._add_mesh(obj, parent, matrix, key)
+        made = self._placed(obj, parent, matrix, key)
+        if made is not None:
+            self.rows[row] = len(self.instances)
+            self.instances.append(made)
 
-    def _add_mesh(self, obj, parent, matrix: Array, key: Hashable) -> None:
-        visibility = self._visibility(obj, parent)
+    def light(self, obj, parent, matrix: Array, key: Hashable) -> Light | None:
+        """A light object read, None where it gives no light."""
+        lights = {
+            "diffuse": obj.visible_diffuse and parent.visible_diffuse,
+            "glossy": obj.visible_glossy and parent.visible_glossy,
+        }
+        return read_light(obj, matrix, key, lights, self.warn)
+
+    def _placed(self, obj, parent, matrix: Array, key: Hashable) -> Instance | None:
+        """A mesh object's instance: the previous scene's where nothing of it changed, so that it is known to be so."""
+        visibility = self.visibility(obj, parent)
         if not visibility:
-            return
+            return None
         mesh = self._mesh(obj)
         if mesh.triangle_count == 0:
-            return
+            return None
         if obj.is_shadow_catcher or parent.is_shadow_catcher:
             self.warn(f"Object '{obj.name}': shadow catchers are not supported yet; it is shown as any other object")
         slots = self._materials(obj, mesh)
-        self.instances.append(Instance(key, mesh.key, slots, matrix, visibility))
+        old = self.before.get(key)
+        same = old is not None and old.mesh == mesh.key and old.materials == slots and old.visibility is visibility
+        if old is not None and same and old.world_from_object.tobytes() == matrix.tobytes():
+            return old
+        return Instance(key, mesh.key, slots, matrix.copy(), visibility)
 
     def _mesh(self, obj) -> Mesh:
         """The mesh of an object: one met before, one of the previous scene, or read now."""
         data = obj.data
+        uid = data.session_uid
+        if uid in self.read_by_uid:
+            return self.read_by_uid[uid]
         if not data.is_editmode:
-            return self._mesh_of_key(obj, data, mesh_key(data))
+            mesh = self.read_by_uid[uid] = self._mesh_of_key(obj, data, mesh_key(data))
+            return mesh
         # In edit mode the arrays are BMesh's: a temporary mesh holds them for us, and only its content names it.
         mesh = obj.to_mesh()
         try:
@@ -143,22 +202,18 @@ class _SceneReader:
         missing = mesh.slots[-1][0] + 1 - len(slots)
         return tuple(slots + [slots[-1]] * max(missing, 0))
 
-    def _visibility(self, obj, parent) -> Visibility:
+    def visibility(self, obj, parent) -> Visibility:
         """What an object takes part in; an instance needs its instancer's leave as well, as in Cycles."""
-        camera = obj.visible_camera and parent.visible_camera
-        shadow = obj.visible_shadow and parent.visible_shadow
-        bounce = obj.visible_diffuse and parent.visible_diffuse
-        holdout = parent.holdout_get(view_layer=self.view_layer) or obj.is_holdout
-        if not holdout and parent.indirect_only_get(view_layer=self.view_layer):
+        camera, shadow, bounce = obj.visible_camera, obj.visible_shadow, obj.visible_diffuse
+        holdout, receives = obj.is_holdout, _receives_bounce(obj)
+        if parent is not obj:
+            camera, shadow = camera and parent.visible_camera, shadow and parent.visible_shadow
+            bounce, receives = bounce and parent.visible_diffuse, receives and _receives_bounce(parent)
+        if self.layers_hold_out and not holdout:
+            holdout = parent.holdout_get(view_layer=self.view_layer)
+        if self.layers_hide and not holdout and parent.indirect_only_get(view_layer=self.view_layer):
             camera = False
-        flags = Visibility(0)
-        for wanted, flag in ((camera, Visibility.CAMERA), (shadow, Visibility.SHADOW), (bounce, Visibility.BOUNCE)):
-            flags |= flag if wanted else Visibility(0)
-        if holdout and camera:
-            flags |= Visibility.HOLDOUT
-        if flags and not (_receives_bounce(obj) and _receives_bounce(parent)):
-            flags |= Visibility.NO_INDIRECT
-        return flags
+        return _visibility(camera, shadow, bounce, holdout, receives)
 
     def _unique_key(self, instance, obj, parent) -> Hashable:
         """A key that stays while objects are moved and edited: who places whom, and the place's number."""

@@ -7,6 +7,7 @@ Each update takes light one bounce further, with the surfaces' reflectance, belo
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -143,7 +144,8 @@ class Cache:
 
 def _bounces(scene: Scene) -> int:
     """After how many bounces light is all but gone, by the mean reflectance of what there is."""
-    used = [m for instance in scene.instances for m in instance.materials]
-    means = [float(np.mean(np.maximum(scene.materials[m].base_color, scene.materials[m].specular))) for m in used]
-    mean = min(max(float(np.mean(means)) if means else 0.0, 0.01), 0.99)
+    used = Counter(m for instance in scene.instances for m in instance.materials)
+    means = {m: np.mean(np.maximum(scene.materials[m].base_color, scene.materials[m].specular)) for m in used}
+    total = sum(float(means[m]) * count for m, count in used.items())
+    mean = min(max(total / max(used.total(), 1), 0.01), 0.99)
     return int(np.clip(np.ceil(np.log(LEFT) / np.log(mean)), LEAST_WARM_UP, MOST_WARM_UP))
