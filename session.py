@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ from .gpu_shaders.technique import Setting, Value
 from .renderer import Renderer, RsmBuffers
 from .scene.changes import Changes
 from .scene.convert import convert_scene
-from .scene.data import Scene, View
+from .scene.data import BakeState, Scene, View
 from .settings import VIEWPORT_SETTINGS, Settings, named_settings
 
 T = TypeVar("T")
@@ -39,6 +39,7 @@ class Status:
     samples: int = 0
     seconds: Mapping[str, float] = field(default_factory=dict)  # by pass, of the newest sample, while they are timed
     redrawn: Mapping[str, float] = field(default_factory=dict)  # what of the statistics grew since the picture began
+    bakes: Mapping[Hashable, BakeState] = field(default_factory=dict)  # Scene.bakes of the last sync
     region: int = 0  # address of the viewport's region, 0: no viewport
 
 
@@ -165,7 +166,7 @@ class Session:
         """Read the depsgraph: CPU work, on any thread. ``options`` are further ones of ``convert_scene``."""
         self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, **options)
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
-        self.status.error = ""
+        self.status.error, self.status.bakes = "", self.scene.bakes
 
     def picture(self, view: View, settings: Settings, passes: Sequence[str]) -> Picture:
         """Bring the GPU up to date; the last picture if scene, view and settings are still the same, else an empty one.

@@ -89,6 +89,18 @@ def read_bake(path: Path) -> Bake:
     return _checked(path, header, parts)
 
 
+def read_about(path: Path) -> Mapping[str, Any]:
+    """``Bake.about`` alone, without looking at the arrays or the checksum. Raises BakeFileError, as ``read_bake``."""
+    openexr = _library()
+    if not path.exists():
+        raise BakeFileError(f"The bake '{path}' is missing: bake again")
+    try:
+        with openexr.File(str(path), header_only=True) as file:
+            return json.loads(file.parts[0].header[_ATTRIBUTE])["about"]
+    except (OSError, RuntimeError, ValueError, TypeError, LookupError) as error:
+        raise BakeFileError(f"'{path}' is no bake of Rebound's, or a damaged one: bake again ({error})") from error
+
+
 def _checked(path: Path, text: str, parts: Mapping[str, Mapping[str, Array]]) -> Bake:
     try:
         header = json.loads(text)

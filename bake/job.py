@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
-from ..scene.data import Array, Instance, Scene, Visibility
+from ..scene.data import Array, Instance, Mesh, Scene, Visibility
 from . import sh
 from .compress import Compressed, compress
 from .file import Bake
@@ -68,36 +68,37 @@ class BakeSettings:
             raise ValueError(f"bands and result_bands together are more than {sh.MAX_BANDS + 1}")
 
 
-def surroundings_fingerprint(scene: Scene, key: Hashable) -> str:
+def surroundings_fingerprint(scene: Scene, key: Hashable, shape_of: Callable[[Mesh], str] = mesh_fingerprint) -> str:
     """Hexadecimal SHA-256 of all that a bake of ``key`` depends on beside its own mesh: who stands where, how coloured.
 
     Seen from the object: moving it and all others together rigidly changes nothing to speak of (5 digits are kept).
+    ``shape_of``: mesh_fingerprint, or the like of it that remembers.
     """
-    own = next(i for i in scene.instances if i.key == key)
+    others = [i for i in scene.instances if i.key == key or i.visibility & Visibility.SHADOW]
+    own = next(i for i in others if i.key == key)
     home = np.eye(4)
     home[:3, :3], home[:3, 3] = frame_of(own.world_from_object), own.world_from_object[:3, 3]
-    lines, shapes = [], {}
-    for other in scene.instances:
-        if other.key == key or other.visibility & Visibility.SHADOW:
-            place = np.linalg.inv(home) @ other.world_from_object
-            colours = [scene.materials[m] for m in other.materials]
-            look = [(c.base_color, str(c.base_color_texture), c.metallic, c.specular, c.layered) for c in colours]
-            flags = int(other.visibility & (Visibility.SHADOW | Visibility.BOUNCE))
-            if other.mesh not in shapes:  # one mesh may stand in 50,000 places
-                shapes[other.mesh] = mesh_fingerprint(scene.meshes[other.mesh])
-            who = f"{shapes[other.mesh]} {other.key == key}"
-            lines.append(f"{who} {(np.round(place, 5) + 0.0).tolist()} {look} {flags}")
+    places = np.round(np.linalg.inv(home) @ np.stack([i.world_from_object for i in others]), 5) + 0.0
+    shapes: dict[Hashable, str] = {}
+    lines = []
+    for other, place in zip(others, places.tolist(), strict=True):
+        colours = [scene.materials[m] for m in other.materials]
+        look = [(c.base_color, str(c.base_color_texture), c.metallic, c.specular, c.layered) for c in colours]
+        flags = int(other.visibility & (Visibility.SHADOW | Visibility.BOUNCE))
+        if other.mesh not in shapes:  # one mesh may stand in 50,000 places
+            shapes[other.mesh] = shape_of(scene.meshes[other.mesh])
+        lines.append(f"{shapes[other.mesh]} {other.key == key} {place} {look} {flags}")
     return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
 
 
-def unfit(about: Any, scene: Scene, key: Hashable) -> str:
+def unfit(about: Any, scene: Scene, key: Hashable, shape_of: Callable[[Mesh], str] = mesh_fingerprint) -> str:
     """Why the bake that ``about`` tells of is not one of this object as it stands; "" where it is. One line."""
     instance = next((i for i in scene.instances if i.key == key), None)
     if instance is None:
         return "the object is no longer there"
-    if about.get("fingerprint") != mesh_fingerprint(scene.meshes[instance.mesh]):
+    if about.get("fingerprint") != shape_of(scene.meshes[instance.mesh]):
         return "the mesh has changed since it was baked: bake again"
-    if about.get("surroundings") != surroundings_fingerprint(scene, key):
+    if about.get("surroundings") != surroundings_fingerprint(scene, key, shape_of):
         return "what stands around the object, or a colour, has changed since it was baked: bake again"
     return ""
 
@@ -119,7 +120,7 @@ def bake_objects(
         raise ValueError(f"object {bare[0]!r} has no surface to bake")
     surfaces = gather(scene, frozenset(keys), settings.cuts if settings.bounces and settings.shadows else 0)
     caster = make_caster(surfaces.corners[surfaces.blocks], settings.rays)
-    yield Progress(0.0, f"rays by {caster.name}")
+    yield Progress(0.0, "shadows", f"CPU, rays by {caster.name}")
     instances = [by_key[key] for key in keys]
     if settings.kind is Kind.DIFFUSE:
         found = yield from _diffuse(surfaces, caster, instances, settings)

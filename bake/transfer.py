@@ -34,6 +34,7 @@ class Progress:
 
     part: float  # 0..1
     doing: str
+    device: str = ""  # what it runs on, as soon as that is known
 
 
 @dataclass(frozen=True)

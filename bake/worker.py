@@ -3,6 +3,7 @@
 ROW is the place of the object among the scene's instances. What happens is said in lines of JSON on the standard
 output:
 
+    {"device": "CPU, rays by embree"}           once, before the first ray
     {"progress": 0.25, "doing": "shadows"}      any number of them
     {"warning": "..."}                          what was done in another way than it should be
     {"done": ["FILE.exr", ...], "seconds": 12}  exit status 0
@@ -118,6 +119,8 @@ def bake(arguments: argparse.Namespace, reporter: _Reporter, asked: threading.Ev
                     write_bake(path, end.value[key])
                 reporter.say(done=[str(p) for p in targets.values()], seconds=round(time.monotonic() - start, 2))
                 return DONE
+            if step.device:
+                reporter.say(device=step.device)
             reporter.progress(step.part, step.doing)
     except (SnapshotError, BakeFileError, OSError, ValueError, ImportError, MemoryError) as error:
         reporter.say(error=str(error) or type(error).__name__)

@@ -32,7 +32,7 @@ class Changes:
     meshes_removed: frozenset[Hashable] = frozenset()
     images_added: frozenset[Hashable] = frozenset()
     images_removed: frozenset[Hashable] = frozenset()
-    instances: bool = False  # an instance was added, removed, moved, hidden, given another mesh or material index
+    instances: bool = False  # an instance was added, removed, moved, hidden, given another mesh, material index or bake
     materials: bool = False  # the material table differs
     lights: frozenset[Hashable] = frozenset()  # lights whose own data changed, added and removed ones included
     world: bool = False
@@ -100,7 +100,8 @@ def _same_instance(a: Instance | None, b: Instance | None) -> bool:
         return True
     if a is None or b is None:
         return False
-    return _same_place(a, b) and a.materials == b.materials and a.visibility == b.visibility
+    same_look = a.materials == b.materials and a.visibility == b.visibility and a.transfer == b.transfer
+    return same_look and _same_place(a, b)
 
 
 def _same_place(a: Instance, b: Instance) -> bool:

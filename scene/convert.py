@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,7 @@ from .images import ImageReader, OnMainThread
 from .lights import read_light
 from .materials import MaterialTable, read_world
 from .meshes import content_key, mesh_key, read_mesh
+from .transfers import TransferReader
 
 # Not among them: grease pencil, which Blender itself draws over any engine's picture.
 UNSHOWN_TYPES = {
@@ -43,6 +45,17 @@ def _visibility(camera: bool, shadow: bool, bounce: bool, holdout: bool, receive
     if flags and not receives:
         flags |= Visibility.NO_INDIRECT
     return flags
+
+
+NO_NUMBER = 0x7FFFFFFF  # in an instance's persistent_id, behind those it has
+
+
+def is_own_surface(key: Hashable, uid: int) -> bool:
+    """Whether Instance.key is that of the object with this session uid itself, and not of another's instance of it.
+
+    A curve, text, surface or metaball comes as the first instance of its evaluated mesh.
+    """
+    return key == (uid,) or key == (uid, uid, 0, *(NO_NUMBER,) * 7)
 
 
 def _here(call: Callable[[], object]) -> object:
@@ -94,6 +107,7 @@ class SceneReader:
         self.warnings: dict[str, None] = {}  # an ordered set: each line once
         self.images = ImageReader(previous.images, self.warn, on_main_thread)
         self.materials = MaterialTable(self.images, self.warn)
+        self.transfers = TransferReader(previous, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.read_by_uid: dict[int, Mesh] = {}  # those of evaluated data-blocks, which many instances share
         self.instances: list[Instance] = []
@@ -163,6 +177,8 @@ class SceneReader:
         if obj.is_shadow_catcher or parent.is_shadow_catcher:
             self.warn(f"Object '{obj.name}': shadow catchers are not supported yet; it is shown as any other object")
         slots = self._materials(obj, mesh)
+        if is_own_surface(key, obj.original.session_uid):
+            self.transfers.add(obj, key)
         old = self.before.get(key)
         same = old is not None and old.mesh == mesh.key and old.materials == slots and old.visibility is visibility
         if old is not None and same and old.world_from_object.tobytes() == matrix.tobytes():
@@ -239,7 +255,7 @@ class SceneReader:
         if not self.for_viewport:
             self._warn_of_unread_settings(scene)
         world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.warn)
-        return Scene(
+        found = Scene(
             meshes={key: mesh for key, mesh in self.read.items() if mesh.triangle_count},
             instances=tuple(self.instances),
             materials=self.materials.finish(),
@@ -248,5 +264,6 @@ class SceneReader:
             world=world,
             film_transparent=bool(scene.render.film_transparent),
             filter_width=float(scene.render.filter_size),
-            warnings=tuple(self.warnings),
         )
+        found = self.transfers.finish(found)
+        return replace(found, warnings=tuple(self.warnings))

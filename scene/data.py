@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, IntFlag
+from typing import Any
 
 import numpy as np
 
@@ -57,6 +58,29 @@ class Instance:
     materials: tuple[int, ...]  # index into Scene.materials for each material slot; at least one entry
     world_from_object: Array  # (4, 4) float64
     visibility: Visibility
+    transfer: Hashable | None = None  # key in Scene.transfers of the bake that lights it
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """How one object passes the light of its surroundings on, as it was baked: what a file holds (docs/prt.md).
+
+    ``key`` names this state of the file.
+    """
+
+    key: Hashable
+    about: Mapping[str, Any]  # plain values: kind, fingerprints, settings, errors
+    arrays: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class BakeState:
+    """What has become of the bake that an object names; ``unused`` says why it lights nothing, "" where it does."""
+
+    transfer: Hashable
+    unused: str = ""
+    about: Mapping[str, Any] = field(default_factory=dict)  # Transfer.about
+    nbytes: int = 0  # of the transfer's arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +210,8 @@ class Scene:
     images: Mapping[Hashable, Image] = field(default_factory=dict)
     lights: tuple[Light, ...] = ()
     world: World = World()
+    transfers: Mapping[Hashable, Transfer] = field(default_factory=dict)  # what was read, of use or not
+    bakes: Mapping[Hashable, BakeState] = field(default_factory=dict)  # by Instance.key
     film_transparent: bool = False
     filter_width: float = 1.5  # Blender's pixel filter width, pixels
     warnings: tuple[str, ...] = ()  # one line each: what could not be read, and what is shown in its place

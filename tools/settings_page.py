@@ -11,7 +11,14 @@ from environments import ROOT
 
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.gpu_shaders.technique import Item, Setting, Value
-from rebound.settings import DISPLAY_SETTINGS, LIGHT_SETTINGS, OBJECT_SETTINGS, SETTINGS, VIEWPORT_SETTINGS
+from rebound.settings import (
+    BAKE_SETTINGS,
+    DISPLAY_SETTINGS,
+    LIGHT_SETTINGS,
+    OBJECT_SETTINGS,
+    SETTINGS,
+    VIEWPORT_SETTINGS,
+)
 
 PAGE = ROOT / "docs" / "manual" / "settings.md"
 HEAD = """# Every setting
@@ -29,6 +36,7 @@ def page() -> str:
         parts.append(_section(title, f"{technique.id}_", technique.settings))
     parts.append("The viewport's own value of a setting is named `viewport_` and its name.\n")
     parts.append(_section("Viewports alone: `scene.rebound`", "viewport_", (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS)))
+    parts.append(_section("Bakes of light transfer: `scene.rebound`", "", BAKE_SETTINGS))
     parts.append(_section("Lights: `light.rebound`", "", LIGHT_SETTINGS))
     parts.append(_section("Objects: `object.rebound`", "", OBJECT_SETTINGS))
     return "\n".join(parts)

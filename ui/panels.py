@@ -5,42 +5,19 @@ from __future__ import annotations
 import bpy
 from bl_ui.properties_render import CompositorPerformanceButtonsPanel
 
-from .. import ENGINE_ID
 from ..gpu_shaders import TECHNIQUES
 from ..gpu_shaders.technique import Setting, Technique
 from ..passes import PASSES
 from ..session import SESSIONS
 from ..settings import DISPLAY_SETTINGS, VIEWPORT_SETTINGS, named_settings, views_of
 from .quality import REBOUND_PT_presets
+from .rebound_panel import ReboundPanel, draw_settings
+from .transfer_panels import REBOUND_PT_object_transfer, REBOUND_PT_transfer
 from .versions import file_notes
 
 MEGABYTE = 1 << 20
 
 SHADOWS = ("shadow_resolution", "soft_shadows")
-
-
-class ReboundPanel:
-    """Mixin: a panel of the Properties editor that is shown with Rebound only."""
-
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "render"
-    COMPAT_ENGINES = {ENGINE_ID}
-
-    @classmethod
-    def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
-
-
-def _draw_settings(layout, group, settings: list[tuple[str, Setting]]) -> None:
-    """One row for each setting, and a "Viewport" row under those that have a value of their own there."""
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    for name, setting in settings:
-        column = layout.column(align=True)
-        column.prop(group, name)
-        if setting.viewport_default is not None:
-            column.prop(group, f"viewport_{name}", text="Viewport")
 
 
 def _named(names: tuple[str, ...]) -> list[tuple[str, Setting]]:
@@ -54,7 +31,7 @@ class REBOUND_PT_sampling(ReboundPanel, bpy.types.Panel):
         REBOUND_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
-        _draw_settings(self.layout, context.scene.rebound, _named(("samples",)))
+        draw_settings(self.layout, context.scene.rebound, _named(("samples",)))
         for line in file_notes(context.scene):
             self.layout.label(text=line, icon="ERROR")
 
@@ -65,7 +42,7 @@ class REBOUND_PT_sampling_advanced(ReboundPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        _draw_settings(self.layout, context.scene.rebound, _named(("seed",)))
+        draw_settings(self.layout, context.scene.rebound, _named(("seed",)))
 
 
 class REBOUND_PT_indirect(ReboundPanel, bpy.types.Panel):
@@ -75,10 +52,10 @@ class REBOUND_PT_indirect(ReboundPanel, bpy.types.Panel):
 
     def draw(self, context):
         group = context.scene.rebound
-        _draw_settings(self.layout, group, _named(("method",)))
+        draw_settings(self.layout, group, _named(("method",)))
         for technique in TECHNIQUES:
             if technique.id.upper() == group.method:
-                _draw_settings(self.layout, group, _settings_of(technique, ""))
+                draw_settings(self.layout, group, _settings_of(technique, ""))
 
 
 def _settings_of(technique: type[Technique], panel: str) -> list[tuple[str, Setting]]:
@@ -98,7 +75,7 @@ def _sub_panel(technique: type[Technique], title: str) -> type:
             return super().poll(context) and context.scene.rebound.method == technique.id.upper()
 
         def draw(self, context):
-            _draw_settings(self.layout, context.scene.rebound, _settings_of(technique, title))
+            draw_settings(self.layout, context.scene.rebound, _settings_of(technique, title))
 
     SubPanel.__name__ = f"REBOUND_PT_{technique.id}_{title.lower().replace(' ', '_')}"
     return SubPanel
@@ -117,7 +94,7 @@ class REBOUND_PT_shadows(ReboundPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        _draw_settings(self.layout, context.scene.rebound, _named(SHADOWS))
+        draw_settings(self.layout, context.scene.rebound, _named(SHADOWS))
 
 
 class REBOUND_PT_film(ReboundPanel, bpy.types.Panel):
@@ -323,6 +300,7 @@ CLASSES = (
     REBOUND_PT_indirect,
     *SUB_PANELS,
     REBOUND_PT_shadows,
+    REBOUND_PT_transfer,
     REBOUND_PT_film,
     REBOUND_PT_status,
     REBOUND_PT_statistics,
@@ -332,6 +310,7 @@ CLASSES = (
     REBOUND_PT_light_shadow,
     REBOUND_PT_light_bounce,
     REBOUND_PT_object_visibility,
+    REBOUND_PT_object_transfer,
     REBOUND_PT_override,
     REBOUND_PT_passes,
 )

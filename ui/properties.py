@@ -10,6 +10,7 @@ import bpy
 
 from ..gpu_shaders.technique import Setting, Value
 from ..settings import (
+    BAKE_SETTINGS,
     DISPLAY_SETTINGS,
     LIGHT_SETTINGS,
     OBJECT_SETTINGS,
@@ -68,6 +69,20 @@ class ReboundObjectSettings(bpy.types.PropertyGroup):
     """What of Rebound's light one object takes part in, beside Blender's own ray visibility."""
 
 
+class ReboundBakeProgress(bpy.types.PropertyGroup):
+    """How far the bake under way is; nothing of it is saved."""
+
+    bake_line: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Bake", description="What the bake under way is doing; empty while there is none"
+    )
+    bake_part: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Progress", description="How far the bake under way is", min=0.0, max=1.0, subtype="FACTOR"
+    )
+    bake_cancel: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Cancel", description="End the bake under way; bakes of before stay"
+    )
+
+
 ReboundSceneSettings.__annotations__ = {
     # 0: never saved by a Rebound that numbered its settings (versions.py).
     "version": bpy.props.IntProperty(
@@ -77,14 +92,29 @@ ReboundSceneSettings.__annotations__ = {
     ),
     **_annotations(named_settings()),
     **{f"viewport_{s.name}": _property(s.name, s, s.default, s.label) for s in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS)},
+    **_annotations((s.name, s) for s in BAKE_SETTINGS),
 }
 ReboundLightSettings.__annotations__ = _annotations((s.name, s) for s in LIGHT_SETTINGS)
-ReboundObjectSettings.__annotations__ = _annotations((s.name, s) for s in OBJECT_SETTINGS)
+ReboundObjectSettings.__annotations__ = {
+    **_annotations((s.name, s) for s in OBJECT_SETTINGS),
+    # Where the object's bake is: an image that packs the file goes before the file.
+    "transfer_file": bpy.props.StringProperty(
+        name="Bake",
+        description="The file with this object's baked light transfer; empty: none, and live light",
+        subtype="FILE_PATH",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        update=_edited,
+    ),
+    "transfer_image": bpy.props.PointerProperty(
+        type=bpy.types.Image, name="Packed Bake", description="This object's baked light transfer, kept in the .blend"
+    ),
+}
 
 OWNERS = (
     (bpy.types.Scene, ReboundSceneSettings),
     (bpy.types.Light, ReboundLightSettings),
     (bpy.types.Object, ReboundObjectSettings),
+    (bpy.types.WindowManager, ReboundBakeProgress),
 )
 
 

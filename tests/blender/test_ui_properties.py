@@ -4,6 +4,7 @@ import bpy
 import pytest
 
 from rebound.settings import (
+    BAKE_SETTINGS,
     DISPLAY_SETTINGS,
     LIGHT_SETTINGS,
     OBJECT_SETTINGS,
@@ -24,7 +25,7 @@ def every_property():
             yield "scene", f"viewport_{name}", name, setting
     for setting in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS):
         yield "scene", f"viewport_{setting.name}", f"viewport_{setting.name}", setting
-    for owner, settings in (("light", LIGHT_SETTINGS), ("object", OBJECT_SETTINGS)):
+    for owner, settings in (("scene", BAKE_SETTINGS), ("light", LIGHT_SETTINGS), ("object", OBJECT_SETTINGS)):
         for setting in settings:
             yield owner, setting.name, setting.name, setting
 

@@ -59,7 +59,7 @@ def test_worker_writes_files_and_says_how_far_it_is(tmp_path):
     targets = ["--bake", f"0={tmp_path / 'floor.exr'}", "--bake", f"1={tmp_path / 'ball.exr'}"]
     status, lines = run(command(tmp_path, None, *targets, "--directions", "128", "--bounces", "1"))
     assert status == 0
-    assert lines[0]["progress"] == 0.0
+    assert "rays by" in lines[0]["device"] and lines[1]["progress"] == 0.0
     assert lines[-1]["done"] == [str(tmp_path / "floor.exr"), str(tmp_path / "ball.exr")]
     floor = read_bake(tmp_path / "floor.exr")
     assert floor.about["settings"]["directions"] == 128
@@ -74,7 +74,7 @@ def test_cancelled_bake_leaves_the_file_before(tmp_path, how):
     path.write_text("before")
     words = command(tmp_path, scene(100, 40), "--bake", f"0={path}", "--directions", "8192", "--bounces", "4", "--ask")
     process = start(words, stdin=subprocess.PIPE)
-    assert "progress" in json.loads(process.stdout.readline())
+    assert "device" in json.loads(process.stdout.readline())
     if how == "line":
         process.stdin.write("cancel\n")
         process.stdin.flush()
@@ -125,7 +125,7 @@ def test_numpy_rays_are_no_warning_where_they_were_asked_for(tmp_path):
     words = ["--bake", f"0={tmp_path / 'a.exr'}", "--rays", "numpy", "--directions", "16", "--bounces", "0"]
     status, lines = run(command(tmp_path, None, *words))
     assert status == 0
-    assert lines[0]["doing"] == "rays by numpy"
+    assert lines[0]["device"] == "CPU, rays by numpy"
     assert not any("warning" in line for line in lines)
 
 

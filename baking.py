@@ -1,0 +1,229 @@
+"""Baking light transfer of Blender's objects: what the operator, the command line and scripts have in common.
+
+``bake(objects)`` is the Python function. What is baked is worked out in a process of its own (bake/process.py); the
+objects get the path of their file, or an image that packs it, when all of it is done.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import tempfile
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .bake.job import BakeSettings, Kind
+from .bake.process import BakeProcess, Outcome
+from .scene.convert import convert_scene, is_own_surface
+from .scene.data import BakeState
+from .scene.errors import SceneError
+from .settings import BAKE_SETTINGS
+
+LOGGER = logging.getLogger("rebound")
+
+SUFFIX = ".transfer.exr"
+
+
+@dataclass(frozen=True)
+class _Target:
+    """One object of a bake."""
+
+    uid: int  # the object's: it may be renamed, or be gone, until the bake is done
+    name: str
+    file: Path
+
+
+class TransferBake:
+    """A bake under way. ``step`` it until it says how it ended, then ``close`` it; to close it earlier cancels."""
+
+    def __init__(self, depsgraph, objects: Iterable, settings: BakeSettings, *, pack: bool) -> None:
+        """Raises SceneError where an object cannot be baked, or files have no place; OSError."""
+        self.pack = pack
+        self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside()
+        try:
+            scene = convert_scene(depsgraph, for_viewport=True)
+            files = self._assign(scene, list(objects))
+            self.process = BakeProcess(scene, files, settings)
+        except BaseException:
+            self._clean()
+            raise
+
+    @property
+    def names(self) -> list[str]:
+        """Of the objects, as they were called at the start."""
+        return [target.name for target in self._targets]
+
+    @property
+    def line(self) -> str:
+        """How far it is, for people."""
+        left = self.process.seconds_left
+        time_left = f", {_duration(left)} left" if left is not None else ""
+        return f"{self.process.part:.0%}, {self.process.doing}{time_left}"
+
+    def step(self) -> Outcome | None:
+        """Look after it; once it is done the objects have their bakes. Raises SceneError where it failed."""
+        outcome = self.process.poll()
+        if outcome is Outcome.FAILED:
+            raise SceneError(f"The bake failed, bakes of before are as they were: {self.process.error}")
+        if outcome is Outcome.DONE:
+            self._hand_over()
+        return outcome
+
+    def close(self) -> None:
+        """End it, and clean up. Harmless when repeated."""
+        self.process.close()
+        self._clean()
+
+    def _assign(self, scene, objects: Sequence) -> dict[Hashable, Path]:
+        """Which file each object's instance goes to."""
+        if not objects:
+            raise SceneError("No object to bake: select some that have a surface")
+        self._targets: list[_Target] = []
+        files: dict[Hashable, Path] = {}
+        for obj in objects:
+            uid = obj.session_uid
+            key = next((i.key for i in scene.instances if is_own_surface(i.key, uid)), None)
+            if key is None:
+                raise SceneError(f"Object '{obj.name}' has no surface that is shown: leave it out of the bake")
+            if obj.library is not None and obj.override_library is None:
+                raise SceneError(f"Object '{obj.name}' is linked from another file: bake it there, or override it")
+            target = _Target(uid, obj.name, self._folder / _file_name(obj.name, {t.file.name for t in self._targets}))
+            self._targets.append(target)
+            files[key] = target.file
+        if not self.pack:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        return files
+
+    def _hand_over(self) -> None:
+        by_uid: dict[int, Any] = {obj.session_uid: obj for obj in bpy.data.objects}
+        for target in self._targets:
+            obj = by_uid.get(target.uid)
+            if obj is None:
+                LOGGER.warning("Object '%s' is gone: its bake is in '%s'", target.name, target.file)
+                continue
+            _take_off(obj)
+            if self.pack:
+                obj.rebound.transfer_image = _packed(target.file)
+            else:
+                obj.rebound.transfer_file = bpy.path.relpath(str(target.file))
+            obj.update_tag()
+
+    def _clean(self) -> None:
+        if self.pack:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def bake(
+    objects: Iterable,
+    settings: BakeSettings | None = None,
+    *,
+    pack: bool | None = None,
+    depsgraph: Any = None,
+    each: Callable[[TransferBake], None] = lambda bake: None,
+) -> list[str]:
+    """Bake Blender objects and wait for it; lines that warn of something. By default as the scene's settings say.
+
+    ``each`` is called with the TransferBake now and then. Raises SceneError, or OSError for files, and leaves all as
+    it was.
+    """
+    depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
+    group: Any = depsgraph.scene.rebound
+    work = TransferBake(
+        depsgraph, objects, settings or settings_of(group), pack=group.bake_pack if pack is None else pack
+    )
+    try:
+        work.process.wait(lambda _process: each(work))
+        if work.step() is Outcome.CANCELLED:
+            raise SceneError("The bake was cancelled, bakes of before are as they were")
+        LOGGER.info("baked %s in %s, %s", ", ".join(work.names), _duration(work.process.seconds), work.process.device)
+        return work.process.warnings
+    finally:
+        work.close()
+
+
+def settings_of(group) -> BakeSettings:
+    """What ``scene.rebound`` says of bakes. Raises SceneError for values that do not go together."""
+    values = {setting.name.removeprefix("bake_"): getattr(group, setting.name) for setting in BAKE_SETTINGS}
+    values |= {"kind": Kind(values["kind"]), "texels": int(values["texels"])}
+    known = {field.name for field in fields(BakeSettings)}
+    try:
+        return BakeSettings(**{name: value for name, value in values.items() if name in known})
+    except ValueError as error:
+        raise SceneError(str(error)) from error
+
+
+def remove(objects: Iterable) -> int:
+    """Take objects' bakes from them; how many had one. Files stay where they are."""
+    baked = [obj for obj in objects if has_bake(obj)]
+    for obj in baked:
+        _take_off(obj)
+        obj.update_tag()
+    return len(baked)
+
+
+def has_bake(obj) -> bool:
+    """Whether an object names a bake, of use or not."""
+    return bool(obj.rebound.transfer_image or obj.rebound.transfer_file)
+
+
+def state_of(obj, bakes: Mapping[Hashable, BakeState]) -> BakeState | None:
+    """That of an object's bake among those of a session; None where none has looked at it."""
+    return next((state for key, state in bakes.items() if is_own_surface(key, obj.session_uid)), None)
+
+
+def facts(about: Mapping, nbytes: int) -> list[str]:
+    """What a bake is, a line each, for the panel. ``nbytes`` 0: not known."""
+    settings = about["settings"]
+    kind = next(item for s in BAKE_SETTINGS if s.name == "bake_kind" for item in s.items if item.key == about["kind"])
+    detail = {
+        "DIFFUSE": f"{settings['bands']} bands",
+        "GLOSSY": f"{settings['bands']} bands to {settings['result_bands']}",
+        "WAVELET": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
+    }[about["kind"]]
+    lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
+    if "rms" in about:
+        lines.append(f"Error of compression {about['rms']:.2%}, worst vertex {about['worst']:.1%}")
+    return [*lines, f"{nbytes / 1e6:.1f} MB"] if nbytes else lines
+
+
+def surfaces(objects: Iterable) -> list:
+    """Those of the objects that may have a surface."""
+    return [obj for obj in objects if obj.type in {"MESH", "CURVE", "SURFACE", "META", "FONT"}]
+
+
+def _take_off(obj) -> None:
+    image = obj.rebound.transfer_image
+    obj.rebound.transfer_image, obj.rebound.transfer_file = None, ""
+    if image is not None and not image.users:
+        bpy.data.images.remove(image)
+
+
+def _packed(path: Path):
+    image = bpy.data.images.load(str(path))
+    image.pack()
+    image.filepath = f"//{path.name}"  # where it was is gone; unpacking asks for a place
+    return image
+
+
+def _folder_beside() -> Path:
+    """Where the bakes of this .blend lie."""
+    if not bpy.data.filepath:
+        raise SceneError("Save the .blend first: bakes are written beside it. Or switch Pack on")
+    blend = Path(bpy.data.filepath)
+    return blend.with_name(f"{blend.stem}.bakes")
+
+
+def _file_name(name: str, taken: set[str]) -> str:
+    plain = bpy.path.clean_name(name)
+    number, found = 1, plain + SUFFIX
+    while found in taken:
+        number, found = number + 1, f"{plain}.{number}{SUFFIX}"
+    return found
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
