@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +52,7 @@ class GpuScene:
         self.boxes = np.zeros((1, 2, 3))  # world boxes of all instances, a point at the origin for an empty scene
         self.revision = 0  # grows with every update that changes something
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
+        self._placed: list[Instance] = []  # those of every row
         self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
         self.white = device.texture((1, 1), "RGBA16F", np.ones((1, 1, 4), np.float32))
@@ -69,7 +71,9 @@ class GpuScene:
             self._images[key] = self._upload_image(scene.images[key])
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
-        if changes.geometry or self.instance_table is None or maps_before != _material_uv_maps(scene):
+        same_draws = self.instance_table is not None and maps_before == _material_uv_maps(scene)
+        only_instances = same_draws and not (changes.materials or changes.meshes_added or changes.meshes_removed)
+        if (changes.geometry or not same_draws) and not (only_instances and self._move(scene)):
             self._place(scene)
         drawn = [scene.materials[index] for index in {draw.material for draw in self.draws}]
         self.is_glossy = any(material.is_glossy for material in drawn)
@@ -135,31 +139,56 @@ class GpuScene:
 
     def _place(self, scene: Scene) -> None:
         """Upload new meshes and the table of instances, and list the draws."""
-        self.uploads["instances"] += 1
         groups: dict[tuple, list[Instance]] = defaultdict(list)
         for instance in scene.instances:
             groups[instance.mesh, instance.materials, instance.visibility].append(instance)
-        draws, matrices, every_box, wanted = [], [], [], set()
+        placed = [instance for members in groups.values() for instance in members]
+        boxes = world_boxes(placed, scene)
+        draws, wanted, start = [], set(), 0
         for (mesh_key, materials, visibility), members in groups.items():
-            mesh = scene.meshes[mesh_key]
-            boxes = world_boxes(members, scene)
-            every_box.append(boxes)
-            bounds = np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+            mesh, end = scene.meshes[mesh_key], start + len(members)
+            bounds = np.stack([boxes[start:end, 0].min(0), boxes[start:end, 1].max(0)])
             for slot, first, count in mesh.slots:
                 material = materials[min(slot, len(materials) - 1)]
                 maps = _uv_maps(scene.materials[material], mesh)
                 wanted.add((mesh_key, maps))
                 vertices = self._vertices(mesh, maps)
-                place = (3 * first, 3 * count, len(matrices), len(members), material, visibility, bounds)
+                place = (3 * first, 3 * count, start, len(members), material, visibility, bounds)
                 draws.append(Draw(vertices, *place, mesh, maps))
-            matrices += [member.world_from_object for member in members]
+            start = end
         for key in self._meshes.keys() - wanted:
             self.device.free(self._meshes.pop(key))
-        self.matrices = np.array(matrices, np.float64).reshape(-1, 4, 4)
-        packed = INSTANCE.pack_arrays(len(matrices), world_from_object=self.matrices)
+        self.matrices = np.array([i.world_from_object for i in placed], np.float64).reshape(-1, 4, 4)
+        self._upload_instances()
+        self.draws, self._placed = tuple(draws), placed
+        self.boxes = boxes if placed else np.zeros((1, 2, 3))
+
+    def _move(self, scene: Scene) -> bool:
+        """Give what is drawn its new matrices; False, and nothing done, where more than that differs."""
+        now = {instance.key: instance for instance in scene.instances}
+        placed = [now.get(instance.key) for instance in self._placed]
+        moved = [row for row, (old, new) in enumerate(zip(self._placed, placed, strict=True)) if old is not new]
+        if len(now) != len(placed) or not moved or not all(_same_draw(self._placed[r], placed[r]) for r in moved):
+            return False
+        self._placed = [instance for instance in placed if instance is not None]
+        of_moved = [self._placed[row] for row in moved]
+        self.matrices, self.boxes = self.matrices.copy(), self.boxes.copy()
+        self.matrices[moved] = [instance.world_from_object for instance in of_moved]
+        self.boxes[moved] = world_boxes(of_moved, scene)
+        self._upload_instances()
+        self.draws = tuple(self._with_new_bounds(draw, moved) for draw in self.draws)
+        return True
+
+    def _with_new_bounds(self, draw: Draw, moved: list[int]) -> Draw:
+        first, end = draw.first_instance, draw.first_instance + draw.instance_count
+        if bisect_left(moved, first) == bisect_left(moved, end):
+            return draw
+        return replace(draw, bounds=np.stack([self.boxes[first:end, 0].min(0), self.boxes[first:end, 1].max(0)]))
+
+    def _upload_instances(self) -> None:
+        self.uploads["instances"] += 1
+        packed = INSTANCE.pack_arrays(len(self.matrices), world_from_object=self.matrices)
         self.instance_table = replace_table(self.device, packed, self.instance_table)
-        self.draws = tuple(draws)
-        self.boxes = np.concatenate(every_box) if every_box else np.zeros((1, 2, 3))
 
     def _vertices(self, mesh: Mesh, maps: UvMaps) -> Vertices:
         key = (mesh.key, maps)
@@ -175,6 +204,12 @@ class GpuScene:
                 }
             )
         return self._meshes[key]
+
+
+def _same_draw(a: Instance, b: Instance | None) -> bool:
+    if b is None or a.transfer != b.transfer:
+        return False
+    return (a.mesh, a.materials, a.visibility) == (b.mesh, b.materials, b.visibility)
 
 
 def _image_mode(lookup: ImageLookup | None) -> int:

@@ -21,8 +21,8 @@ from .gpu_shaders.frame import DISPLAY, SPLIT
 from .gpu_shaders.technique import Setting, Value
 from .renderer import Renderer, RsmBuffers
 from .scene.changes import Changes
-from .scene.convert import convert_scene
 from .scene.data import BakeState, Scene, View
+from .scene.follow import SceneFollower
 from .settings import VIEWPORT_SETTINGS, Settings, named_settings
 
 T = TypeVar("T")
@@ -158,13 +158,14 @@ class Session:
     def __init__(self) -> None:
         self.scene = Scene()
         self.status = Status()
+        self._follower = SceneFollower()
         self._gpu: _Gpu | None = None
         self._picture: Picture | None = None
         SESSIONS.alive.add(self)
 
     def sync(self, depsgraph, *, for_viewport: bool, **options: Any) -> None:
-        """Read the depsgraph: CPU work, on any thread. ``options`` are further ones of ``convert_scene``."""
-        self.scene = convert_scene(depsgraph, for_viewport=for_viewport, previous=self.scene, **options)
+        """Read the depsgraph: CPU work, on any thread. ``options`` are further ones of ``SceneFollower.read``."""
+        self.scene = self._follower.read(depsgraph, for_viewport=for_viewport, **options)
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
         self.status.error, self.status.bakes = "", self.scene.bakes
 

@@ -58,7 +58,8 @@ def is_own_surface(key: Hashable, uid: int) -> bool:
     return key == (uid,) or key == (uid, uid, 0, *(NO_NUMBER,) * 7)
 
 
-def _here(call: Callable[[], object]) -> object:
+def here(call: Callable[[], object]) -> object:
+    """For ``on_main_thread``, on the main thread."""
     return call()
 
 
@@ -68,7 +69,7 @@ def convert_scene(
     for_viewport: bool,
     previous: Scene | None = None,
     visible: Callable[[object], bool] | None = None,
-    on_main_thread: OnMainThread = _here,
+    on_main_thread: OnMainThread = here,
 ) -> Scene:
     """Read everything that a frame needs from an evaluated depsgraph.
 
@@ -83,11 +84,10 @@ def convert_scene(
     return reader.scene()
 
 
-def instance_matrices(depsgraph) -> Array:
-    """World matrices of all of depsgraph.object_instances, (n, 4, 4) float32: ten times quicker than one by one."""
-    items = depsgraph.object_instances
-    columns = np.empty(16 * len(items), np.float32)
-    items.foreach_get("matrix_world", columns)
+def instance_matrices(depsgraph, count: int) -> Array:
+    """World matrices of all ``count`` of depsgraph.object_instances, (n, 4, 4) float32, quicker than one by one."""
+    columns = np.empty(16 * count, np.float32)
+    depsgraph.object_instances.foreach_get("matrix_world", columns)
     return columns.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
@@ -98,7 +98,14 @@ class SceneReader:
     of its Light, None where nothing did.
     """
 
-    def __init__(self, depsgraph, for_viewport, previous, visible, on_main_thread):
+    def __init__(
+        self,
+        depsgraph,
+        for_viewport: bool,
+        previous: Scene,
+        visible: Callable[[object], bool] | None = None,
+        on_main_thread: OnMainThread = here,
+    ) -> None:
         self.depsgraph = depsgraph
         self.for_viewport = for_viewport
         self.view_layer = depsgraph.view_layer_eval
@@ -114,6 +121,8 @@ class SceneReader:
         self.lights: list[Light] = []
         self.keys: set[Hashable] = set()
         self.rows: list[int | None] = []
+        self.instancers: set[int] = set()  # session uids of the original objects that place others
+        self.is_whole = True  # False if something was left out because of its transform
         self.before = {instance.key: instance for instance in previous.instances}
         # Asked of every object only where some collection says so: a third of the time of reading an object.
         self.layers_hold_out = _says(self.view_layer.layer_collection, "holdout")
@@ -124,7 +133,7 @@ class SceneReader:
 
     def add_all(self) -> None:
         """Take in all of depsgraph.object_instances."""
-        matrices = instance_matrices(self.depsgraph).astype(np.float64)
+        matrices = instance_matrices(self.depsgraph, len(self.depsgraph.object_instances)).astype(np.float64)
         fine = np.abs(matrices).max((1, 2), initial=0.0) < FARTHEST  # false for NaN
         for row, instance in enumerate(self.depsgraph.object_instances):
             self.rows.append(None)
@@ -144,12 +153,15 @@ class SceneReader:
         if self.visible is not None and not self.visible(parent.original):
             return
         if not is_finite:
+            self.is_whole = False
             self.warn(f"Object '{obj.name}': its transform is not finite or too large; it is left out")
             return
         key = self._unique_key(instance, obj, parent)
         if kind == "LIGHT":
             light = self.light(obj, parent, matrix, key)
-            if light is not None:
+            if light is None:
+                self.is_whole = False
+            else:
                 self.rows[row] = ~len(self.lights)
                 self.lights.append(light)
             return
@@ -235,6 +247,7 @@ class SceneReader:
         """A key that stays while objects are moved and edited: who places whom, and the place's number."""
         key: tuple = (parent.original.session_uid,)
         if instance.is_instance:
+            self.instancers.add(key[0])
             key = (*key, obj.original.session_uid, *instance.persistent_id)
         while key in self.keys:
             key = (*key, -1)
