@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -105,6 +105,7 @@ class SceneReader:
         previous: Scene,
         visible: Callable[[object], bool] | None = None,
         on_main_thread: OnMainThread = here,
+        known: Mapping[Hashable, Mesh] | None = None,
     ) -> None:
         self.depsgraph = depsgraph
         self.for_viewport = for_viewport
@@ -116,6 +117,8 @@ class SceneReader:
         self.materials = MaterialTable(self.images, self.warn)
         self.transfers = TransferReader(previous, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
+        self.known = known or {}  # what meshes were when they were read last, by mesh_key
+        self.states: dict[Hashable, Mesh] = {}  # the same for the next time
         self.read_by_uid: dict[int, Mesh] = {}  # those of evaluated data-blocks, which many instances share
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
@@ -204,22 +207,29 @@ class SceneReader:
         if uid in self.read_by_uid:
             return self.read_by_uid[uid]
         if not data.is_editmode:
-            mesh = self.read_by_uid[uid] = self._mesh_of_key(obj, data, mesh_key(data))
+            state = mesh_key(data)
+            mesh = self._used(self.known[state]) if state in self.known else self._of_content(obj, data)
+            self.read_by_uid[uid] = self.states[state] = mesh
             return mesh
         # In edit mode the arrays are BMesh's: a temporary mesh holds them for us, and only its content names it.
         mesh = obj.to_mesh()
         try:
-            return self._mesh_of_key(obj, mesh, content_key(mesh))
+            return self._of_content(obj, mesh)
         finally:
             obj.to_mesh_clear()
 
-    def _mesh_of_key(self, obj, data, key: Hashable) -> Mesh:
-        if key not in self.read:
-            mesh = self.previous.meshes.get(key) or read_mesh(data, key, obj.name)
+    def _of_content(self, obj, data) -> Mesh:
+        """A mesh that looks so: Blender evaluates many anew that come out as they were, after undo all of them."""
+        key = content_key(data)
+        known = self.read.get(key) or self.previous.meshes.get(key)
+        return self._used(known or read_mesh(data, key, obj.name))
+
+    def _used(self, mesh: Mesh) -> Mesh:
+        if mesh.key not in self.read:
+            self.read[mesh.key] = mesh
             for line in mesh.warnings:
                 self.warn(line)
-            self.read[key] = mesh
-        return self.read[key]
+        return mesh
 
     def _materials(self, obj, mesh: Mesh) -> tuple[int, ...]:
         """Material indices by slot, at least as many as the mesh's slots reach."""

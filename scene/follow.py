@@ -7,7 +7,7 @@ A scene of 10,000 objects takes a tenth of a second to read, which is too long f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from .cameras import FARTHEST
 from .convert import SceneReader, here, instance_matrices
-from .data import Array, Light, Scene
+from .data import Array, Instance, Light, Mesh, Scene
 from .images import OnMainThread
 from .meshes import mesh_key
 
@@ -37,6 +37,7 @@ class SceneFollower:
     def __init__(self) -> None:
         self.scene = Scene()
         self._read: _Read | None = None
+        self._known: dict[Hashable, Mesh] = {}  # by meshes.mesh_key
 
     def read(
         self,
@@ -49,17 +50,53 @@ class SceneFollower:
         """As ``convert_scene``, whose ``previous`` is the scene read last. To be called for every update there is."""
         before, self._read = self._read, None
         moved = _moved_objects(depsgraph, before) if before and for_viewport and not self.scene.bakes else None
-        found = _with_new_places(self.scene, before, moved, depsgraph) if before and moved else None
+        found = self._with_new_places(before, moved, depsgraph) if before and moved else None
         if found is not None:
             self.scene, self._read = found
             return self.scene
-        reader = SceneReader(depsgraph, for_viewport, self.scene, visible, on_main_thread)
+        reader = SceneReader(depsgraph, for_viewport, self.scene, visible, on_main_thread, self._known)
         reader.add_all()
-        self.scene = reader.scene()
+        self.scene, self._known = reader.scene(), reader.states
         if for_viewport and reader.is_whole:
             ids, matrices = _item_ids(depsgraph, len(reader.rows)), instance_matrices(depsgraph, len(reader.rows))
             self._read = _Read(_place(depsgraph), tuple(reader.rows), matrices, ids, frozenset(reader.instancers))
         return self.scene
+
+    def _with_new_places(self, before: _Read, moved: Mapping[int, Any], depsgraph) -> tuple[Scene, _Read] | None:
+        """The scene with the matrices that the depsgraph has now; None where it must be read as a whole."""
+        scene, count = self.scene, len(depsgraph.object_instances)
+        if count != len(before.rows) or not np.array_equal(_item_ids(depsgraph, count), before.ids):
+            return None
+        matrices = instance_matrices(depsgraph, count)
+        changed = np.flatnonzero((matrices != before.matrices).any((1, 2)))
+        if not np.abs(matrices[changed]).max(initial=0.0) < FARTHEST:
+            return None
+        reader = SceneReader(depsgraph, True, Scene())
+        instances, lights = list(scene.instances), list(scene.lights)
+        for row in changed:
+            number, matrix = before.rows[row], matrices[row].astype(np.float64)
+            if number is None:
+                continue
+            if number >= 0:
+                instances[number] = replace(instances[number], world_from_object=matrix)
+                continue
+            light = _moved_light(reader, lights[~number], matrix, moved)
+            if light is None:
+                return None
+            lights[~number] = light
+        for instance in scene.instances:
+            obj = moved.get(instance.key[0]) if len(instance.key) == 1 else None  # type: ignore[index, arg-type]
+            if obj is not None and not self._is_as_before(reader, obj, instance):
+                return None
+        if reader.warnings:
+            return None
+        now = replace(scene, instances=tuple(instances), lights=tuple(lights)) if len(changed) else scene
+        return now, replace(before, matrices=matrices)
+
+    def _is_as_before(self, reader: SceneReader, obj, instance: Instance) -> bool:
+        """Whether an object is all that it was but for its place: a script can change more in one go."""
+        mesh = self._known.get(mesh_key(obj.data))
+        return mesh is not None and mesh.key == instance.mesh and reader.visibility(obj, obj) is instance.visibility
 
 
 def _place(depsgraph) -> tuple:
@@ -92,43 +129,6 @@ def _moved_objects(depsgraph, before: _Read) -> Mapping[int, Any] | None:
     return moved or None
 
 
-def _with_new_places(scene: Scene, before: _Read, moved: Mapping[int, Any], depsgraph) -> tuple[Scene, _Read] | None:
-    """The scene with the matrices that the depsgraph has now; None where it must be read as a whole."""
-    count = len(depsgraph.object_instances)
-    if count != len(before.rows) or not np.array_equal(_item_ids(depsgraph, count), before.ids):
-        return None
-    matrices = instance_matrices(depsgraph, count)
-    changed = np.flatnonzero((matrices != before.matrices).any((1, 2)))
-    if not np.abs(matrices[changed]).max(initial=0.0) < FARTHEST:
-        return None
-    reader = SceneReader(depsgraph, True, Scene())
-    instances, lights = list(scene.instances), list(scene.lights)
-    for row in changed:
-        number, matrix = before.rows[row], matrices[row].astype(np.float64)
-        if number is None:
-            continue
-        if number >= 0:
-            instances[number] = replace(instances[number], world_from_object=matrix)
-            continue
-        light = _moved_light(reader, lights[~number], matrix, moved)
-        if light is None:
-            return None
-        lights[~number] = light
-    for instance in scene.instances:
-        obj = moved.get(instance.key[0]) if len(instance.key) == 1 else None  # type: ignore[index, arg-type]
-        if obj is not None and not _is_as_before(reader, obj, instance):
-            return None
-    if reader.warnings:
-        return None
-    now = replace(scene, instances=tuple(instances), lights=tuple(lights)) if len(changed) else scene
-    return now, replace(before, matrices=matrices)
-
-
 def _moved_light(reader: SceneReader, light: Light, matrix: Array, moved: Mapping[int, Any]) -> Light | None:
     obj = moved.get(light.key[0]) if len(light.key) == 1 else None  # type: ignore[index, arg-type]
     return reader.light(obj, obj, matrix, light.key) if obj is not None else None
-
-
-def _is_as_before(reader: SceneReader, obj, instance) -> bool:
-    """Whether an object is all that it was but for its place: a script can change more in one go."""
-    return reader.visibility(obj, obj) is instance.visibility and mesh_key(obj.data) == instance.mesh

@@ -46,7 +46,7 @@ def test_linked_duplicates_share_their_mesh():
 
 
 def test_collection_instances_are_placed():
-    made = collection("Things", mesh("A"), mesh("B"))
+    made = collection("Things", mesh("A"), mesh("B", CUBE))
     instancer(made, location=(5, 0, 0))
     instancer(made, location=(0, 5, 0), scale=(-1, 1, 1))
     scene = checked(convert())
