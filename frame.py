@@ -25,6 +25,7 @@ class Frame:
     height: int
     gbuffer: GBuffer
     gbuffer_target: Target
+    emission_target: Target  # the G-buffer's emission alone
     background_target: Target  # what of the G-buffer means something where there is no surface
     light: LightTargets
     direct_target: Target  # both direct ones of ``light``
@@ -47,6 +48,7 @@ class Frame:
         """Everything to free: framebuffers before their textures."""
         targets = (
             self.gbuffer_target,
+            self.emission_target,
             self.background_target,
             *self._lights,
             self.direct_target,
@@ -97,6 +99,7 @@ def new_frame(device: Device, width: int, height: int, passes: Sequence[str]) ->
         height,
         gbuffer,
         device.target(gbuffer.colors, gbuffer.depth),
+        device.target([gbuffer.emission]),
         device.target([gbuffer.albedo, gbuffer.position], gbuffer.depth),
         light,
         device.target(direct),

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .device.interface import Device, Texture, Vertices
+from .gpu_shaders.frame.environment import Environment
 from .gpu_shaders.frame.structs import IMAGE_CLOSEST, IMAGE_EXTEND, INSTANCE, MATERIAL
 from .gpu_shaders.frame.tables import replace_table
 from .scene.changes import Changes, world_boxes
@@ -55,6 +56,7 @@ class GpuScene:
         self._placed: list[Instance] = []  # those of every row
         self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
+        self.environment = Environment(device)
         self.white = device.texture((1, 1), "RGBA16F", np.ones((1, 1, 4), np.float32))
         self.instance_table: Texture | None = None
         self.material_table: Texture | None = None
@@ -69,6 +71,9 @@ class GpuScene:
             self.device.free(self._images.pop(key))
         for key in changes.images_added:
             self._images[key] = self._upload_image(scene.images[key])
+        self.environment.update(scene.world, self._images)
+        if self.environment.suns:
+            self.scene = replace(scene, lights=(*scene.lights, *self.environment.suns))
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
         same_draws = self.instance_table is not None and maps_before == _material_uv_maps(scene)
@@ -107,6 +112,7 @@ class GpuScene:
         for table in (self.instance_table, self.material_table):
             if table is not None:
                 self.device.free(table)
+        self.environment.free()
         self._meshes.clear()
         self._images.clear()
         self.instance_table = self.material_table = None
@@ -118,7 +124,9 @@ class GpuScene:
     def _upload_image(self, image: Image) -> Texture:
         self.uploads["images"] += 1
         height, width = image.pixels.shape[:2]
-        return self.device.texture((width, height), "RGBA16F", np.ascontiguousarray(image.pixels, np.float32))
+        pixels = np.ascontiguousarray(image.pixels, np.float32)
+        largest = pixels.max(initial=0.0)  # a panorama's sun may be brighter than half floats can be
+        return self.device.texture((width, height), "RGBA16F" if largest < 6e4 else "RGBA32F", pixels)
 
     def _upload_materials(self, materials: tuple[Material, ...]) -> None:
         self.uploads["materials"] += 1

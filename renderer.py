@@ -109,6 +109,8 @@ class Renderer:
         shown = shown_view(settings)
         frame.extras.keep(needed(shown, split=bool(settings["split"])))
         self._draw_gbuffer(frame, inputs)
+        if _has_panorama(gpu_scene):
+            gpu_scene.environment.draw_background(inputs, frame.emission_target)
         self.clock.mark("surfaces")
         yield GBUFFER_DONE
         for done in self._draw_direct(frame, inputs, settings):
@@ -275,10 +277,12 @@ class Renderer:
         given: dict[str, Any] = {
             f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))
         }
-        given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*scene.world.color, 1.0)
+        color = scene.world.color if scene.world.seen else (0.0, 0.0, 0.0)
+        given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*color, 1.0)
         given["pc_eye"] = inputs.eye
         for sums, target in targets.items():
-            shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect)
+            panorama = _has_panorama(inputs.gpu_scene)
+            shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect, panorama=panorama)
             wanted = (*shader.samplers, *shader.constants)
             resources = {name: given[name] for name in wanted}
             self.device.fullscreen(shader, target, state=state, **resources)
@@ -299,6 +303,11 @@ class Renderer:
             technique.view(view.key, inputs, values, target, light)
 
         draw_technique_view(self.device, view, frame.extras, scratch, combined, frame.samples, draw)
+
+
+def _has_panorama(gpu_scene: GpuScene) -> bool:
+    """Whether the picture's background is more than one colour."""
+    return gpu_scene.environment.has_background and not gpu_scene.scene.film_transparent
 
 
 def _inputs(frame: Frame, gpu_scene: GpuScene, view: View, seed: int, mark: Callable[[str], None]) -> FrameInputs:

@@ -284,7 +284,7 @@ def _missing(scene: Scene) -> tuple[str, ...]:
     if not scene.instances:
         return ("The scene has nothing to draw: the picture shows the background only",)
     used = {index for instance in scene.instances for index in instance.materials}
-    shines = any(scene.world.color) or any(any(scene.materials[index].emission) for index in used)
+    shines = scene.world.shines or any(any(scene.materials[index].emission) for index in used)
     if not scene.lights and not shines:
         return ("The scene has no light: no lamp, no emission, and a black world",)
     return ()

@@ -12,9 +12,10 @@ from .cameras import FARTHEST, camera_warnings
 from .data import Array, Instance, Light, Mesh, Scene, Visibility
 from .images import ImageReader, OnMainThread
 from .lights import read_light
-from .materials import MaterialTable, read_world
+from .materials import MaterialTable
 from .meshes import content_key, mesh_key, read_mesh
 from .transfers import TransferReader
+from .world import read_world
 
 # Not among them: grease pencil, which Blender itself draws over any engine's picture.
 UNSHOWN_TYPES = {
@@ -277,7 +278,7 @@ class SceneReader:
         scene = self.depsgraph.scene_eval
         if not self.for_viewport:
             self._warn_of_unread_settings(scene)
-        world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.warn)
+        world = read_world(getattr(self.view_layer, "world_override", None) or scene.world, self.images, self.warn)
         found = Scene(
             meshes={key: mesh for key, mesh in self.read.items() if mesh.triangle_count},
             instances=tuple(self.instances),

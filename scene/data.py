@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from .node_graph import NodeGraph
+
 Array = np.ndarray
 
 
@@ -177,9 +179,25 @@ class Light:
 
 @dataclass(frozen=True)
 class World:
-    """The background, one colour for now. ``color`` is radiance, strength included."""
+    """The background. ``color`` is radiance, strength included, of one that is the same on all sides.
+
+    Any other has a ``graph``, whose emission in a direction is the radiance from there; ``color`` is black then.
+    """
 
     color: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    graph: NodeGraph | None = None
+    values: tuple[float, ...] = ()  # the graph's numbers, four a texel
+    images: tuple[Hashable, ...] = ()  # keys of Scene.images, by Node.image
+    seen: bool = True  # by the camera; else the background is black
+    diffuse: bool = True  # whether it lights diffusely, and in mirrors
+    glossy: bool = True
+    sun_threshold: float = 10.0  # radiance above which a compact spot is taken for a sun, 0: never
+    sun_angle: float = 0.0  # least angular diameter of such a sun, radians
+
+    @property
+    def shines(self) -> bool:
+        """Whether any light may come from it."""
+        return self.graph is not None or any(self.color)
 
 
 @dataclass(frozen=True, eq=False)

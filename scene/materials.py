@@ -1,6 +1,6 @@
-"""Blender material and world -> Material and World: colour, specular lobe, emission and images of the common shaders.
+"""Blender material -> Material: colour, specular lobe, emission and images of the common shaders.
 
-The full node graph is to be compiled in place of this file; what it must offer is `MaterialTable` and `read_world`.
+The full node graph is to be compiled in place of this file; what it must offer is `MaterialTable`.
 """
 
 from __future__ import annotations
@@ -8,20 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from .data import Material, Texture, World
+from .data import Material, Texture
 from .images import ImageReader
 from .nodes import (
     RGB,
     Socket,
     active_output,
-    all_nodes,
     constant,
     default_rgb,
     find_input,
     mean,
     node_tree,
     source,
-    strength_and_color,
 )
 
 BLACK: RGB = (0.0, 0.0, 0.0)
@@ -358,26 +356,3 @@ def _is_driven(socket: Socket | None) -> bool:
     """Whether a node that is not muted makes the value of an input."""
     found = socket and source(socket)
     return bool(found and found.socket.is_output and not found.node.mute)
-
-
-def read_world(world, warn: Callable[[str], None]) -> World:
-    """Read a bpy world (None: black). A texture is replaced by the socket's constant, with a warning."""
-    if world is None:
-        return World()
-    tree = node_tree(world)
-    if tree is None:
-        return World(tuple(world.color))
-    output = active_output(tree)
-    surface = find_input(output, "Surface") if output else None
-    if surface is None or not surface.socket.is_linked:
-        return World()
-    owner = f"World '{world.name}'"
-    found = source(surface)
-    if found.socket.is_output and found.node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
-        return World(strength_and_color(found, owner, "the socket's own value is shown", warn))
-    for node in all_nodes(tree):
-        if node.bl_idname == "ShaderNodeBackground":
-            warn(f"{owner}: node '{found.node.name}' is not read yet; its node '{node.name}' is shown alone")
-            return World(strength_and_color(Socket(node.outputs[0]), owner, "the socket's own value is shown", warn))
-    warn(f"{owner}: node '{found.node.name}' is not read yet; black is shown")
-    return World()

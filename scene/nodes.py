@@ -6,7 +6,7 @@ Knows nothing of what a shader means; ``materials`` and ``lights`` ask it for co
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
@@ -147,11 +147,3 @@ def strength_and_color(node_socket: Socket, owner: str, fallback: str, warn: Cal
         values.append(value)
     color, strength = values
     return tuple(c * mean(strength) for c in color)
-
-
-def all_nodes(tree) -> Iterator:
-    """Every node of a tree, those inside groups included."""
-    for node in tree.nodes:
-        yield node
-        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
-            yield from all_nodes(node.node_tree)

@@ -1,7 +1,8 @@
 """A scene and a view in one file, to be rendered where there is no Blender: on another machine, in a test.
 
 The file is a .npz: one long array for each type of number, and a JSON text that says what lies where in them. It is
-made from the fields of the dataclasses and enums in ``data``, whatever they are: a new field there needs nothing here.
+made from the fields of the dataclasses and enums in ``data`` and ``node_graph``, whatever they are: a new field needs
+nothing here.
 Nothing is pickled, so that a file from somebody else can do no more than be refused.
 """
 
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from . import data
+from . import data, node_graph
 from .data import Scene, View
 
 # Grows when the way of writing changes, not when a field is added to a class of ``data``.
@@ -36,8 +37,9 @@ DAMAGES = (
 
 KINDS: dict[str, type] = {
     name: kind
-    for name, kind in vars(data).items()
-    if isinstance(kind, type) and kind.__module__ == data.__name__ and (is_dataclass(kind) or issubclass(kind, Enum))
+    for module in (data, node_graph)
+    for name, kind in vars(module).items()
+    if isinstance(kind, type) and kind.__module__ == module.__name__ and (is_dataclass(kind) or issubclass(kind, Enum))
 }
 
 

@@ -9,7 +9,8 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 albedo = texelFetch(albedo_tx, pixel, 0);
   bool background = albedo.a == 0.0;
-  vec3 emission = background ? vec3(0.0) : texelFetch(emission_tx, pixel, 0).rgb;
+  vec3 glow = texelFetch(emission_tx, pixel, 0).rgb;
+  vec3 emission = background ? vec3(0.0) : glow;
   vec3 direct = texelFetch(diffuse_direct_tx, pixel, 0).rgb * albedo.rgb;
   vec3 indirect = vec3(0.0);
   vec3 glossy_direct = vec3(0.0);
@@ -23,7 +24,11 @@ void main()
   glossy_indirect = texelFetch(glossy_indirect_tx, pixel, 0).rgb;
 #endif
 #endif
+#ifdef PANORAMA
+  vec3 environment = background ? glow : vec3(0.0); /* environment_background_frag.glsl drew it there */
+#else
   vec3 environment = background ? pc_background.rgb : vec3(0.0);
+#endif
   float alpha = background ? pc_background.a : max(albedo.a, 0.0);
   vec3 combined = direct + indirect + glossy_direct + glossy_indirect + emission + environment;
 #ifdef WANT_COMBINED

@@ -120,17 +120,18 @@ DIRECT = {
 }
 
 
-def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool) -> Shader:
+def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool, panorama: bool = False) -> Shader:
     """Add a sample to up to six ``sums``: of SUMS, or "moments" (luminance, its square).
 
-    Without ``glossy`` or ``indirect`` that light is taken for none.
+    Without ``glossy`` or ``indirect`` that light is taken for none. ``panorama``: the background is more than one
+    colour, and stands in the G-buffer's emission.
     """
     light = ["diffuse_direct", *(["diffuse_indirect"] if indirect else [])]
     light += ["glossy_direct", *(["glossy_indirect"] if indirect else [])] if glossy else []
     albedo = glossy and "glossy_color" in sums
     samplers = ["albedo", "emission", *light, *(["position", "normal", "specular"] if albedo else [])]
     defines = [f"WANT_{name.upper()}" for name in sums]
-    defines += [name for name, wanted in (("GLOSSY", glossy), ("INDIRECT", indirect)) if wanted]
+    defines += [name for name, wanted in (("GLOSSY", glossy), ("INDIRECT", indirect), ("PANORAMA", panorama)) if wanted]
     return Shader(
         name="_".join(["frame_accumulate", *(d.lower() for d in defines if "_" not in d), sums[0], str(len(sums))]),
         fragment="frame/frame_accumulate_frag.glsl",
@@ -174,9 +175,9 @@ SPLIT = Shader(
 
 # The accumulations of a viewport, and of a final render with all passes.
 _ACCUMULATE = tuple(
-    accumulate(sums, glossy=lit, indirect=lit)
+    accumulate(sums, glossy=lit, indirect=lit, panorama=panorama)
     for sums in (SUMS[:1], SUMS[:6], SUMS[6:], ("moments",))
-    for lit in (False, True)
+    for lit, panorama in ((False, False), (True, False), (True, True))
 )
 
 SHADERS = (GBUFFER, SHADOW, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)

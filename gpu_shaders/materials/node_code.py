@@ -166,6 +166,7 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
     ),
     "ShaderNodeBsdfTransparent": Code({"BSDF": "surface_transparent({Color}, point.normal)"}, ("surface",)),
     "ShaderNodeEmission": Code({"Emission": "surface_emission({Color}, {Strength}, point.normal)"}, ("surface",)),
+    "ShaderNodeBackground": Code({"Background": "surface_emission({Color}, {Strength}, point.normal)"}, ("surface",)),
     "ShaderNodeMixShader": Code({"Shader": "surface_mix({Shader}, {Shader_001}, {Fac})"}, ("surface",)),
     "ShaderNodeAddShader": Code({"Shader": "surface_add({Shader}, {Shader_001})"}, ("surface",)),
     "ShaderNodeTexImage": texture_code.image,

@@ -206,6 +206,7 @@ class Vpl:
             "contact": int(settings["occlusion"] == "CONTACTS"),
             "bound": float(bool(settings["bound"])),
             "lobe": float(settings["lobe"]),
+            "mirrored": int(inputs.gpu_scene.environment.mirrored),
             "kinds": kinds,
             "number": number,
             "seed": inputs.noise_seed(2),
@@ -229,4 +230,4 @@ class Vpl:
 
 def _has_first_hand(gpu_scene: GpuScene) -> bool:
     """Whether emitters or the sky give light: direct light from the pool, whose first bounce is the cache's."""
-    return gpu_scene.emits or any(gpu_scene.scene.world.color)
+    return gpu_scene.emits or gpu_scene.environment.lights

@@ -291,6 +291,7 @@ class Gathering:
             grid.reflect_target,
             normal_tx=inputs.gbuffer.normal,
             specular_color_tx=inputs.gbuffer.specular,
+            environment_tx=inputs.gpu_scene.environment.texture,
             **candidates,
             pc_stride=now.stride,
             pc_offset=now.offset,

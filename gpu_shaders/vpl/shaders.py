@@ -17,7 +17,8 @@ SKY = Shader(
     name="vpl_sky",
     fragment="vpl/vpl_sky_frag.glsl",
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_specular": "VEC4"},
-    constants={"pc_sphere": "VEC4", "pc_radiance": "VEC3", "pc_counts": "FLOAT", "pc_viewport": "VEC4"},
+    samplers={"environment_tx": "FLOAT_2D"},
+    constants={"pc_sphere": "VEC4", "pc_diffuse": "FLOAT", "pc_counts": "FLOAT", "pc_viewport": "VEC4"},
     defines=_DEFINES,
 )
 
@@ -208,7 +209,7 @@ REFLECT = _candidate_pass(
     "vpl_reflect",
     "vpl/vpl_reflect_frag.glsl",
     ("out_indirect", "out_direct"),
-    ("position_tx", "normal_tx", "specular_color_tx"),
+    ("position_tx", "normal_tx", "specular_color_tx", "environment_tx"),
     _COARSE,
     (_GLOSSY,),
 )

@@ -113,12 +113,11 @@ class Sources(ReflectiveShadowMaps):
         return [next((part for part, share in PARTS if p >= share * strongest), PARTS[-1][0]) for p in power]
 
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
-        scene = gpu_scene.scene
         tiles = []
         if gpu_scene.emits:
             tiles.append(MapTile(EMITTERS, -1, _NO_FACE))
-        if any(scene.world.color):
-            look = np.array([*scene.world.color, *_sky_sphere(gpu_scene.boxes)]).tobytes()
+        if gpu_scene.environment.lights or gpu_scene.environment.mirrored:
+            look = np.array([gpu_scene.environment.revision, *_sky_sphere(gpu_scene.boxes)]).tobytes()
             tiles.append(MapTile(SKY_PATCHES, -1, _NO_FACE, look))
         if self._with_cache:
             tiles.append(MapTile(CACHE, -1, _NO_FACE))
@@ -132,7 +131,8 @@ class Sources(ReflectiveShadowMaps):
                 target,
                 viewport=viewport,
                 pc_sphere=_sky_sphere(gpu_scene.boxes),
-                pc_radiance=gpu_scene.scene.world.color,
+                environment_tx=gpu_scene.environment.texture,
+                pc_diffuse=float(gpu_scene.environment.lights),
                 pc_counts=0.25 / SKY_DISTANCE**2,
                 pc_viewport=viewport,
             )

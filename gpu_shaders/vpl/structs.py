@@ -39,6 +39,7 @@ VPL_FRAME = Struct(
     contact="int",  # 1: rays test contacts on the screen, too
     bound="float",  # 1: lights are discs of the area they stand for, 0: points
     lobe="float",  # least roughness of the lobes that lights send
+    mirrored="int",  # 1: glossy surfaces show the world
     kinds="int",  # bits of SourceKind: which are asked
     number="int",  # of the sample in its sequence of noise
     seed="int",

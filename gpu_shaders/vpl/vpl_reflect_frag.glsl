@@ -1,10 +1,13 @@
 /* What a glossy surface reflects to the eye: one ray along a normal that the eye sees (bxdf_sample_ggx), and what it
- * finds there: the light that lamps' maps hold for the place, that of the cache, emitters, or the sky. */
+ * finds there: the light that lamps' maps hold for the place, that of the cache, emitters, or the world. */
+#include "lib/environment_lib.glsl"
 #include "vpl/vpl_candidates_lib.glsl"
 #include "vpl/vpl_surface_lib.glsl"
 
 /* Apart from the seeds of the candidates. */
 const int REFLECT_SEED = 2048;
+/* Rays that the first one counts for. */
+const float REFLECT_RAYS = 4.0;
 
 void main()
 {
@@ -30,8 +33,12 @@ void main()
   vec3 origin = voxel_start_seen(P, geometric, V);
   float far = voxel_trace(origin, direction, 1e30);
   if (far < 0.0) {
-    vec3 sky = vpl_frame.sky.z > 0.0 ? vpl_radiance(candidates_sky(direction), -direction) : vec3(0.0);
-    out_direct = vec4(weight * sky, 1.0);
+    if (vpl_frame.mirrored != 0) {
+      /* Blurred over what one of the rays so far stands for (Krivanek & Colbert 2008): that falls with their number. */
+      float rays = REFLECT_RAYS * float(vpl_frame.number + 1) * bxdf_sample_density(N, V, direction, specular.a);
+      float level = environment_level_of(environment_tx, 1.0 / max(rays, 1e-6));
+      out_direct = vec4(weight * environment_radiance(environment_tx, direction, level), 1.0);
+    }
     return;
   }
   vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;

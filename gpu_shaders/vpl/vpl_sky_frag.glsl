@@ -1,4 +1,5 @@
 /* The sky as an octahedral map of far patches: each a surface that looks at the scene and sends the world's radiance. */
+#include "lib/environment_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 
@@ -11,8 +12,10 @@ void main()
   float scale = 1.0 / (abs(direction.x) + abs(direction.y) + abs(direction.z));
   float omega = 4.0 / (pc_viewport.z * pc_viewport.w * scale * scale * scale);
   float area = omega * pc_sphere.w * pc_sphere.w;
+  float level = environment_level_of(environment_tx, 4.0 * MATH_PI / (pc_viewport.z * pc_viewport.w));
+  vec3 radiance = environment_radiance(environment_tx, direction, level);
   out_position_area = vec4(pc_sphere.xyz + pc_sphere.w * direction, area);
   out_normal = vec4(-direction, float(SOURCE_SKY));
-  out_flux = vec4(MATH_PI * area * pc_radiance.rgb, pc_counts);
+  out_flux = vec4(pc_diffuse * MATH_PI * area * radiance, pc_counts);
   out_specular = vec4(0.0);
 }

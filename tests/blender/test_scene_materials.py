@@ -320,15 +320,6 @@ def test_no_world_is_black():
     assert convert().world.color == (0, 0, 0)
 
 
-def test_world_texture_is_replaced_by_the_sockets_color_with_one_line():
-    made = world(strength=2)
-    texture = made.node_tree.nodes.new("ShaderNodeTexSky")
-    made.node_tree.links.new(texture.outputs[0], made.node_tree.nodes["Background"].inputs["Color"])
-    scene = convert()
-    assert scene.world.color == rgb(0.2, 0.4, 0.6)
-    assert len(scene.warnings) == 1 and "'Sky'" in scene.warnings[0]
-
-
 def test_film_settings_are_read():
     render = bpy.context.scene.render
     render.film_transparent, render.filter_size = True, 2.25
