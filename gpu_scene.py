@@ -6,21 +6,23 @@ from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from .device.interface import Device, Texture, Vertices
+from .device.shader import Shader
 from .gpu_shaders.frame.environment import Environment
-from .gpu_shaders.frame.structs import IMAGE_CLOSEST, IMAGE_EXTEND, INSTANCE, MATERIAL
+from .gpu_shaders.frame.structs import INSTANCE, MATERIAL, MATERIAL_VIEW
 from .gpu_shaders.frame.tables import replace_table
-from .scene.changes import Changes, world_boxes
-from .scene.data import Image, Instance, Material, Mesh, Scene, Visibility
-from .scene.data import Texture as ImageLookup
+from .gpu_shaders.materials import VALUE_WIDTH, Attribute, MaterialShader, generate
+from .scene.changes import Changes, told, world_boxes
+from .scene.data import Image, Instance, Material, Mesh, Scene, View, Visibility
 
 # Updates whose moved boxes are kept. A light map that was not looked at for longer is drawn again.
 REMEMBERED_MOVES = 64
 
-UvMaps = tuple[str, str]  # the maps that the base colour's and the emission's texture use
+Layout = tuple[tuple[str, Attribute], ...]  # vertex inputs beside position and normal, and what of the mesh they take
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,6 @@ class Draw:
     visibility: Visibility
     bounds: np.ndarray  # (2, 3) float64: of all its instances, world space
     mesh: Mesh
-    uv_maps: UvMaps
 
 
 class GpuScene:
@@ -54,16 +55,21 @@ class GpuScene:
         self.revision = 0  # grows with every update that changes something
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._placed: list[Instance] = []  # those of every row
-        self._meshes: dict[tuple[Hashable, UvMaps], Vertices] = {}
+        self._told = np.zeros((0, 12))  # what materials can ask of them beside their place: _instance_row()
+        self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of the draws that let light pass
+        self._meshes: dict[tuple[Hashable, Layout], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
         self.environment = Environment(device)
-        self.white = device.texture((1, 1), "RGBA16F", np.ones((1, 1, 4), np.float32))
+        self._codes: tuple[MaterialShader | None, ...] = ()  # of each material
+        self._first_values: tuple[int, ...] = ()  # each material's first texel among the values
+        self._view = np.zeros(0, np.float32)  # MATERIAL_VIEW of the camera
         self.instance_table: Texture | None = None
         self.material_table: Texture | None = None
+        self.value_table: Texture | None = None
 
     def update(self, scene: Scene, changes: Changes) -> None:
         """Make the GPU hold ``scene``; only what ``changes`` names is uploaded."""
-        maps_before = _material_uv_maps(self.scene)
+        fields_before = self._mesh_fields
         self.scene = scene
         if changes.any:
             self.revision += 1
@@ -76,13 +82,17 @@ class GpuScene:
             self.scene = replace(scene, lights=(*scene.lights, *self.environment.suns))
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
-        same_draws = self.instance_table is not None and maps_before == _material_uv_maps(scene)
+        same_draws = self.instance_table is not None and fields_before == [
+            code and code.mesh_fields for code in self._codes
+        ]
         only_instances = same_draws and not (changes.materials or changes.meshes_added or changes.meshes_removed)
         if (changes.geometry or not same_draws) and not (only_instances and self._move(scene)):
             self._place(scene)
         drawn = [scene.materials[index] for index in {draw.material for draw in self.draws}]
         self.is_glossy = any(material.is_glossy for material in drawn)
         self.emits = any(any(material.emission) for material in drawn)
+        passing = [draw.bounds for draw in self.draws if self.lets_pass(draw.material)]
+        self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
         if len(changes.moved_bounds):
             self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
             del self._moved[:-REMEMBERED_MOVES]
@@ -97,29 +107,57 @@ class GpuScene:
         boxes = [shapes if shapes_only else moved for when, moved, shapes in self._moved if when > revision]
         return np.concatenate(boxes) if boxes else np.zeros((0, 2, 3))
 
-    def textures_of(self, material: int) -> dict[str, Texture]:
-        """The two samplers of a draw with this material."""
-        m = self.scene.materials[material]
-        return {"base_tx": self._image(m.base_color_texture), "emission_tx": self._image(m.emission_texture)}
+    @property
+    def _mesh_fields(self) -> list[dict[str, Attribute] | None]:
+        """What each material asks meshes for: it decides how they are laid out."""
+        return [code and code.mesh_fields for code in self._codes]
+
+    def look_from(self, view: View) -> None:
+        """Tell materials where the camera is."""
+        toward = np.diag((1.0, 1.0, -1.0, 1.0)) @ view.view_from_world  # Cycles' camera looks along its z
+        window = view.clip_from_view @ view.view_from_world
+        row = {"camera_from_world": toward, "window_from_world": window}
+        self._view = MATERIAL_VIEW.pack([row], for_uniform=True)[0]
+
+    def code_of(self, material: int) -> MaterialShader | None:
+        """What a material is drawn by; None where it is the same all over."""
+        return self._codes[material]
+
+    def lets_pass(self, material: int) -> bool:
+        """Whether light may go on through a material."""
+        return self.scene.materials[material].passing > 0.0
+
+    def material_inputs(self, program: Shader) -> dict[str, Any]:
+        """What a program of ``material_program`` wants to know of all materials."""
+        given: dict[str, Any] = {"material_tx": self.material_table}
+        if "value_tx" in program.samplers:
+            given["value_tx"] = self.value_table
+        if "material_view" in program.uniforms:
+            given["material_view"] = self._view
+        return given
+
+    def own_inputs(self, material: int) -> dict[str, Any]:
+        """What such a program wants to know of a draw's material."""
+        given: dict[str, Any] = {"pc_material": material}
+        graph = self.scene.materials[material].graph
+        if graph is not None:
+            given["pc_values"] = self._first_values[material]
+            given |= {f"image_{k}_tx": self._images[key] for k, key in enumerate(graph.images)}
+        return given
 
     @property
     def triangle_count(self) -> int:
         return sum(draw.vertex_count // 3 * draw.instance_count for draw in self.draws)
 
     def free(self) -> None:
-        for resource in (*self._meshes.values(), *self._images.values(), self.white):
+        tables = self.instance_table, self.material_table, self.value_table
+        for resource in (*self._meshes.values(), *self._images.values(), *tables):
             self.device.free(resource)
-        for table in (self.instance_table, self.material_table):
-            if table is not None:
-                self.device.free(table)
         self.environment.free()
         self._meshes.clear()
         self._images.clear()
-        self.instance_table = self.material_table = None
+        self.instance_table = self.material_table = self.value_table = None
         self.draws = ()
-
-    def _image(self, lookup: ImageLookup | None) -> Texture:
-        return self.white if lookup is None else self._images.get(lookup.image, self.white)
 
     def _upload_image(self, image: Image) -> Texture:
         self.uploads["images"] += 1
@@ -130,20 +168,13 @@ class GpuScene:
 
     def _upload_materials(self, materials: tuple[Material, ...]) -> None:
         self.uploads["materials"] += 1
-        rows = [
-            {
-                "base_color": m.base_color,
-                "base_mode": _image_mode(m.base_color_texture),
-                "emission": m.emission,
-                "emission_mode": _image_mode(m.emission_texture),
-                "specular": m.specular,
-                "metallic": m.metallic,
-                "roughness": m.roughness,
-                "layered": m.layered,
-            }
-            for m in materials
-        ]
+        rows = [{field.name: getattr(m, field.name) for field in MATERIAL.fields} for m in materials]
         self.material_table = replace_table(self.device, MATERIAL.pack(rows), self.material_table)
+        self._codes = tuple(None if m.graph is None else generate(m.graph.graph) for m in materials)
+        tables = [np.zeros((1, 4), np.float32) if m.graph is None else m.graph.table for m in materials]
+        self._first_values = tuple(np.cumsum([0, *map(len, tables)])[:-1].tolist())
+        self.device.free(self.value_table)
+        self.value_table = self.device.texture(*_value_rows(tables))
 
     def _place(self, scene: Scene) -> None:
         """Upload new meshes and the table of instances, and list the draws."""
@@ -152,21 +183,24 @@ class GpuScene:
             groups[instance.mesh, instance.materials, instance.visibility].append(instance)
         placed = [instance for members in groups.values() for instance in members]
         boxes = world_boxes(placed, scene)
+        layouts = self._layouts(scene)
         draws, wanted, start = [], set(), 0
         for (mesh_key, materials, visibility), members in groups.items():
             mesh, end = scene.meshes[mesh_key], start + len(members)
             bounds = np.stack([boxes[start:end, 0].min(0), boxes[start:end, 1].max(0)])
             for slot, first, count in mesh.slots:
                 material = materials[min(slot, len(materials) - 1)]
-                maps = _uv_maps(scene.materials[material], mesh)
-                wanted.add((mesh_key, maps))
-                vertices = self._vertices(mesh, maps)
+                layout = layouts[mesh_key, material]
+                wanted.add((mesh_key, layout))
+                vertices = self._vertices(mesh, layout)
                 place = (3 * first, 3 * count, start, len(members), material, visibility, bounds)
-                draws.append(Draw(vertices, *place, mesh, maps))
+                draws.append(Draw(vertices, *place, mesh))
             start = end
         for key in self._meshes.keys() - wanted:
             self.device.free(self._meshes.pop(key))
         self.matrices = np.array([i.world_from_object for i in placed], np.float64).reshape(-1, 4, 4)
+        told = [_instance_row(instance, scene.meshes[instance.mesh]) for instance in placed]
+        self._told = np.array(told, np.float64).reshape(-1, 12)
         self._upload_instances()
         self.draws, self._placed = tuple(draws), placed
         self.boxes = boxes if placed else np.zeros((1, 2, 3))
@@ -195,42 +229,71 @@ class GpuScene:
 
     def _upload_instances(self) -> None:
         self.uploads["instances"] += 1
-        packed = INSTANCE.pack_arrays(len(self.matrices), world_from_object=self.matrices)
+        told = self._told
+        packed = INSTANCE.pack_arrays(
+            len(told),
+            world_from_object=self.matrices,
+            color=told[:, :4],
+            texture_origin=told[:, 4:7],
+            texture_scale=told[:, 7:10],
+            random=told[:, 10],
+            index=told[:, 11],
+        )
         self.instance_table = replace_table(self.device, packed, self.instance_table)
 
-    def _vertices(self, mesh: Mesh, maps: UvMaps) -> Vertices:
-        key = (mesh.key, maps)
+    def _layouts(self, scene: Scene) -> dict[tuple[Hashable, int], Layout]:
+        """The vertex inputs of each mesh with each of its materials: one set for as many of them as agree."""
+        asked: dict[Hashable, dict[int, None]] = defaultdict(dict)
+        for instance in scene.instances:
+            asked[instance.mesh].update(dict.fromkeys(instance.materials))
+        found = {}
+        for mesh, materials in asked.items():
+            sets: list[dict[str, Attribute]] = []
+            chosen = {}
+            for material in materials:
+                code = self._codes[material]
+                wanted = {} if code is None else {f"in_{name}": a for name, a in code.mesh_fields.items()}
+                fitting = next((s for s in sets if all(s.get(n, a) == a for n, a in wanted.items())), None)
+                if fitting is None:
+                    fitting = {}
+                    sets.append(fitting)
+                fitting.update(wanted)
+                chosen[material] = fitting
+            found |= {(mesh, material): tuple(sorted(c.items(), key=_by_name)) for material, c in chosen.items()}
+        return found
+
+    def _vertices(self, mesh: Mesh, layout: Layout) -> Vertices:
+        key = (mesh.key, layout)
         if key not in self._meshes:
             self.uploads["meshes"] += 1
-            none = np.zeros((len(mesh.positions), 2), np.float32)
+            attributes = {name: mesh.corner_attribute(a.field, a.name) for name, a in layout}
             self._meshes[key] = self.device.vertices(
-                {
-                    "in_position": mesh.positions,
-                    "in_normal": mesh.normals,
-                    "in_base_uv": mesh.uvs.get(maps[0], none),
-                    "in_emission_uv": mesh.uvs.get(maps[1], none),
-                }
+                {"in_position": mesh.positions, "in_normal": mesh.normals, **attributes}
             )
         return self._meshes[key]
 
 
 def _same_draw(a: Instance, b: Instance | None) -> bool:
-    if b is None or a.transfer != b.transfer:
+    if b is None or a.transfer != b.transfer or told(a) != told(b):
         return False
     return (a.mesh, a.materials, a.visibility) == (b.mesh, b.materials, b.visibility)
 
 
-def _image_mode(lookup: ImageLookup | None) -> int:
-    return -1 if lookup is None else IMAGE_CLOSEST * lookup.closest + IMAGE_EXTEND * (not lookup.repeat)
+def _by_name(item: tuple[str, Attribute]) -> str:
+    return item[0]
 
 
-def _uv_maps(material: Material, mesh: Mesh) -> UvMaps:
-    """The maps by name; "" where the material has no texture, so that its meshes are kept once."""
-    lookups = (material.base_color_texture, material.emission_texture)
-    return tuple("" if t is None else t.uv_map or mesh.active_uv for t in lookups)  # type: ignore[return-value]
+def _instance_row(instance: Instance, mesh: Mesh) -> tuple[float, ...]:
+    """Colour, texture_origin, texture_scale, random, index."""
+    lower, upper = mesh.bounds if mesh.texture_space is None else mesh.texture_space
+    scale = 1.0 / np.maximum(upper - lower, 1e-20)
+    return (*instance.color, *lower.tolist(), *scale.tolist(), instance.random, float(instance.index))
 
 
-def _material_uv_maps(scene: Scene) -> list[tuple[str | None, ...]]:
-    """All of the materials that decides how meshes are laid out for the GPU."""
-    lookups = ((m.base_color_texture, m.emission_texture) for m in scene.materials)
-    return [tuple(None if t is None else t.uv_map for t in pair) for pair in lookups]
+def _value_rows(tables: list[np.ndarray]) -> tuple[tuple[int, int], str, np.ndarray]:
+    """All values as the arguments of Device.texture."""
+    values = np.concatenate([*tables, np.zeros((1, 4), np.float32)])
+    height = -(-len(values) // VALUE_WIDTH)
+    rows = np.zeros((height * VALUE_WIDTH, 4), np.float32)
+    rows[: len(values)] = values
+    return (VALUE_WIDTH, height), "RGBA32F", rows.reshape(height, VALUE_WIDTH, 4)

@@ -18,7 +18,7 @@ from .gpu_scene import Draw, GpuScene
 from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.clock import Clock
 from .gpu_shaders.frame.direct import DirectLight
-from .gpu_shaders.frame.draws import ADD, draw_scene, material_of, visible_draws
+from .gpu_shaders.frame.draws import ADD, draw_scene, visible_draws
 from .gpu_shaders.frame.inputs import FrameInputs
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
@@ -104,6 +104,7 @@ class Renderer:
             self.restart(frame)
         self.clock.begin()
         inputs = _inputs(frame, gpu_scene, view, int(settings["seed"]), self.clock.mark)
+        gpu_scene.look_from(view)
         self._triangles, self._lights = gpu_scene.triangle_count, len(gpu_scene.scene.lights)
         technique = self._technique(settings)
         shown = shown_view(settings)
@@ -226,8 +227,7 @@ class Renderer:
 
         def each(draw: Draw) -> dict:
             holdout, alone = Visibility.HOLDOUT in draw.visibility, Visibility.NO_INDIRECT in draw.visibility
-            flags = {"pc_holdout": int(holdout), "pc_no_indirect": int(alone)}
-            return {**flags, **material_of(inputs.gpu_scene, draw)}
+            return {"pc_holdout": int(holdout), "pc_no_indirect": int(alone)}
 
         draw_scene(
             self.device,
@@ -236,9 +236,9 @@ class Renderer:
             frame.gbuffer_target,
             visible_draws(inputs.gpu_scene, Visibility.CAMERA | Visibility.HOLDOUT),
             each,
-            material_tx=inputs.gpu_scene.material_table,
             pc_clip_from_world=inputs.clip_from_world,
             pc_eye=inputs.eye,
+            pc_dither=inputs.noise_seed(4) + inputs.sample,
         )
 
     def _accumulate(self, frame: Frame, inputs: FrameInputs, *, indirect: bool) -> None:

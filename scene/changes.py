@@ -101,7 +101,7 @@ def _same_instance(a: Instance | None, b: Instance | None) -> bool:
     if a is None or b is None:
         return False
     same_look = a.materials == b.materials and a.visibility == b.visibility and a.transfer == b.transfer
-    return same_look and _same_place(a, b)
+    return same_look and told(a) == told(b) and _same_place(a, b)
 
 
 def _same_place(a: Instance, b: Instance) -> bool:
@@ -139,10 +139,11 @@ def _moved_bounds(
         same_shape = a is not None and b is not None and _same_place(a, b)
         if same_shape and _same_look(a, b, old, new):
             continue
+        blocks_otherwise = not same_shape or _lets_pass(a, old) or _lets_pass(b, new)
         for side, instance, scene in ((0, a, old), (1, b, new)):
             if instance is not None and instance.mesh in scene.meshes:
                 places[side].append(instance)
-                of_shape[side].append(not same_shape)
+                of_shape[side].append(blocks_otherwise)
     moved = np.concatenate([world_boxes(places[0], old), world_boxes(places[1], new)])
     return moved, moved[np.array([*of_shape[0], *of_shape[1]], bool)]
 
@@ -156,13 +157,23 @@ def _recoloured(old: Scene, new: Scene) -> set[int]:
     return {index for index, (a, b) in enumerate(both) if a is not b and a != b} | set(beyond)
 
 
+def _lets_pass(instance: Instance | None, scene: Scene) -> bool:
+    """Whether the materials decide what light an instance blocks."""
+    return instance is not None and any(scene.materials[index].passing for index in instance.materials)
+
+
 def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:
     """True if both take part in the same light and wear equal materials, whatever their places in the two tables."""
-    if (a.visibility ^ b.visibility) & LOOK_FLAGS:
+    if (a.visibility ^ b.visibility) & LOOK_FLAGS or told(a) != told(b):
         return False
     if old.materials is new.materials:
         return a.materials == b.materials
     return [old.materials[i] for i in a.materials] == [new.materials[i] for i in b.materials]
+
+
+def told(instance: Instance) -> tuple:
+    """What materials can ask of an instance beside its place."""
+    return instance.color, instance.index, instance.random
 
 
 def world_bounds(instance: Instance, scene: Scene) -> Array:

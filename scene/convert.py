@@ -23,6 +23,7 @@ UNSHOWN_TYPES = {
     "POINTCLOUD": "point clouds",
     "VOLUME": "volumes",
 }
+MOST_RANDOM_ID = 0xFFFFFFFF
 
 
 def _receives_bounce(obj) -> bool:
@@ -120,7 +121,7 @@ class SceneReader:
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.known = known or {}  # what meshes were when they were read last, by mesh_key
         self.states: dict[Hashable, Mesh] = {}  # the same for the next time
-        self.read_by_uid: dict[int, Mesh] = {}  # those of evaluated data-blocks, which many instances share
+        self.read_by_uid: dict[tuple, Mesh] = {}  # those of evaluated data-blocks, which many instances share
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.keys: set[Hashable] = set()
@@ -169,7 +170,7 @@ class SceneReader:
                 self.rows[row] = ~len(self.lights)
                 self.lights.append(light)
             return
-        made = self._placed(obj, parent, matrix, key)
+        made = self._placed(instance, parent, matrix, key)
         if made is not None:
             self.rows[row] = len(self.instances)
             self.instances.append(made)
@@ -182,48 +183,55 @@ class SceneReader:
         }
         return read_light(obj, matrix, key, lights, self.warn)
 
-    def _placed(self, obj, parent, matrix: Array, key: Hashable) -> Instance | None:
+    def _placed(self, instance, parent, matrix: Array, key: Hashable) -> Instance | None:
         """A mesh object's instance: the previous scene's where nothing of it changed, so that it is known to be so."""
+        obj = instance.object
         visibility = self.visibility(obj, parent)
         if not visibility:
             return None
-        mesh = self._mesh(obj)
+        worn = self._worn(obj)
+        wanted, asks_object = self.materials.asked(worn)
+        mesh = self._mesh(obj, wanted)
         if mesh.triangle_count == 0:
             return None
         if obj.is_shadow_catcher or parent.is_shadow_catcher:
             self.warn(f"Object '{obj.name}': shadow catchers are not supported yet; it is shown as any other object")
-        slots = self._materials(obj, mesh)
+        slots = worn + worn[-1:] * max(mesh.slots[-1][0] + 1 - len(worn), 0)
         if is_own_surface(key, obj.original.session_uid):
             self.transfers.add(obj, key)
+        told: dict = {}
+        if asks_object:
+            told = {"color": tuple(obj.color), "index": obj.pass_index, "random": instance.random_id / MOST_RANDOM_ID}
         old = self.before.get(key)
         same = old is not None and old.mesh == mesh.key and old.materials == slots and old.visibility is visibility
+        same = same and all(getattr(old, name) == value for name, value in told.items())
         if old is not None and same and old.world_from_object.tobytes() == matrix.tobytes():
             return old
-        return Instance(key, mesh.key, slots, matrix.copy(), visibility)
+        return Instance(key, mesh.key, slots, matrix.copy(), visibility, **told)
 
-    def _mesh(self, obj) -> Mesh:
+    def _mesh(self, obj, wanted: tuple[str, ...]) -> Mesh:
         """The mesh of an object: one met before, one of the previous scene, or read now."""
         data = obj.data
         uid = data.session_uid
-        if uid in self.read_by_uid:
-            return self.read_by_uid[uid]
+        if (uid, wanted) in self.read_by_uid:
+            return self.read_by_uid[uid, wanted]
         if not data.is_editmode:
-            state = mesh_key(data)
-            mesh = self._used(self.known[state]) if state in self.known else self._of_content(obj, data)
-            self.read_by_uid[uid] = self.states[state] = mesh
+            state = mesh_key(data, wanted)
+            mesh = self._used(self.known[state]) if state in self.known else self._of_content(obj, data, wanted)
+            self.read_by_uid[uid, wanted] = self.states[state] = mesh
             return mesh
         # In edit mode the arrays are BMesh's: a temporary mesh holds them for us, and only its content names it.
         mesh = obj.to_mesh()
         try:
-            return self._of_content(obj, mesh)
+            return self._of_content(obj, mesh, wanted)
         finally:
             obj.to_mesh_clear()
 
-    def _of_content(self, obj, data) -> Mesh:
+    def _of_content(self, obj, data, wanted: tuple[str, ...]) -> Mesh:
         """A mesh that looks so: Blender evaluates many anew that come out as they were, after undo all of them."""
-        key = content_key(data)
+        key = content_key(data, wanted)
         known = self.read.get(key) or self.previous.meshes.get(key)
-        return self._used(known or read_mesh(data, key, obj.name))
+        return self._used(known or read_mesh(data, key, obj.name, wanted))
 
     def _used(self, mesh: Mesh) -> Mesh:
         if mesh.key not in self.read:
@@ -232,14 +240,12 @@ class SceneReader:
                 self.warn(line)
         return mesh
 
-    def _materials(self, obj, mesh: Mesh) -> tuple[int, ...]:
-        """Material indices by slot, at least as many as the mesh's slots reach."""
+    def _worn(self, obj) -> tuple[int, ...]:
+        """Material indices by slot, at least one; what lies beyond the slots wears the last."""
         override = self.view_layer.material_override
         if override is not None:
-            return (self.materials.index(override),) * (mesh.slots[-1][0] + 1)
-        slots = [self.materials.index(slot.material) for slot in obj.material_slots] or [0]
-        missing = mesh.slots[-1][0] + 1 - len(slots)
-        return tuple(slots + [slots[-1]] * max(missing, 0))
+            return (self.materials.index(override),)
+        return tuple(self.materials.index(slot.material) for slot in obj.material_slots) or (0,)
 
     def visibility(self, obj, parent) -> Visibility:
         """What an object takes part in; an instance needs its instancer's leave as well, as in Cycles."""

@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from .node_graph import NodeGraph
+from .node_graph import FilledGraph, NodeGraph
 
 Array = np.ndarray
+# Rec. 709 luminance of scene-linear RGB.
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +37,28 @@ class Mesh:
     slots: tuple[tuple[int, int, int], ...]  # (material slot, first triangle, triangle count), slots ascending
     bounds: Array  # (2, 3) float32: lower and upper corner, object space
     warnings: tuple[str, ...] = ()  # what could not be read, for Scene.warnings of every scene that uses it
+    attributes: Mapping[str, Array] = field(default_factory=dict)  # those its materials ask for -> (3T, 4) float32
+    texture_space: Array | None = None  # (2, 3) float32: corners of the box of Generated coordinates; None: ``bounds``
 
     @property
     def triangle_count(self) -> int:
         return len(self.positions) // 3
+
+    def corner_attribute(self, field: str, name: str) -> Array:
+        """(3T, 2) of a UV map or (3T, 4) of a "color", float32; "" names the active one, zeros what is not there.
+
+        A UV map may be asked for as a colour.
+        """
+        uvs = self.uvs.get(name or self.active_uv)
+        if field == "uv":
+            return np.zeros((len(self.positions), 2), np.float32) if uvs is None else uvs
+        found = self.attributes.get(name)
+        if found is None:
+            found = np.zeros((len(self.positions), 4), np.float32)
+            found[:, 3] = 1.0
+            if uvs is not None and name:
+                found[:, :2] = uvs
+        return found
 
 
 class Visibility(IntFlag):
@@ -61,6 +81,9 @@ class Instance:
     world_from_object: Array  # (4, 4) float64
     visibility: Visibility
     transfer: Hashable | None = None  # key in Scene.transfers of the bake that lights it
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)  # what Object Info tells of it, as the next two
+    index: int = 0
+    random: float = 0.0  # 0..1
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,22 +134,24 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """A surface as far as this version shades it: a Lambertian reflector under a GGX lobe, that may emit.
+    """A surface: a Lambertian reflector under a GGX lobe, that may emit and let light pass.
 
     Diffuse is ``base_color * (1 - metallic)``, less what the layer over it reflects. The lobe's reflectance at normal
     incidence (F0) goes from ``specular`` to ``base_color`` with ``metallic``; black there means no lobe.
-    The place for the full node graph: a material will carry generated GLSL beside these constants.
+    With a ``graph`` these are its look on the whole, for what is not drawn with it.
     """
 
     name: str
     base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)  # reflectance, 0..1
-    base_color_texture: Texture | None = None  # replaces base_color
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)  # radiance, W/(m² sr); strength included
-    emission_texture: Texture | None = None  # times emission
     metallic: float = 0.0  # 0..1
     specular: tuple[float, float, float] = (0.0, 0.0, 0.0)  # F0 of the dielectric part, 0..1
     roughness: float = 0.5  # 0..1, the square root of GGX's alpha
     layered: float = 1.0  # 0..1: how much of ``specular`` lies over the diffuse part and takes its light from it
+    passing: float = 0.0  # 0..1: of light that goes on through it; above 0 only with a graph
+    base_color_texture: Texture | None = None  # the image that the graph lays on as its base colour
+    graph: FilledGraph | None = None  # what it is drawn by; None: it is the same all over
+    index: int = 0  # its pass index, which Object Info tells
 
     @property
     def is_glossy(self) -> bool:

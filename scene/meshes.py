@@ -8,33 +8,48 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 
 import numpy as np
 
 from .data import Array, Mesh
 
+# By an attribute's type: what foreach_get is asked for, numbers an element, and their dtype.
+LAYERS = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int8),
+    "BOOLEAN": ("value", 1, np.bool_),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "INT32_2D": ("value", 2, np.int32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
+}
 # A triangle whose doubled area is below this share of its longest edge squared is a line within float32's precision.
 FLATNESS = 1e-7
 
 
-def mesh_key(mesh) -> Hashable:
+def mesh_key(mesh, wanted: tuple[str, ...] = ()) -> Hashable:
     """Names the state of an evaluated bpy mesh, quickly: where it is the same, so is ``content_key``.
 
     The session uid of evaluated data is new after every evaluation of the geometry and shared by all instances.
     """
-    return (mesh.session_uid, len(mesh.materials), _active_uv(mesh))
+    return (mesh.session_uid, len(mesh.materials), _active_uv(mesh), *wanted)
 
 
-def content_key(mesh) -> Hashable:
+def content_key(mesh, wanted: tuple[str, ...] = ()) -> Hashable:
     """The Mesh.key of a bpy mesh, the same for all whose arrays are: a second's work for some 20 million triangles."""
-    return (_content_hash(mesh), len(mesh.materials), _active_uv(mesh))
+    return (_content_hash(mesh), len(mesh.materials), _active_uv(mesh), *wanted)
 
 
-def read_mesh(mesh, key: Hashable, owner: str) -> Mesh:
+def read_mesh(mesh, key: Hashable, owner: str, wanted: tuple[str, ...] = ()) -> Mesh:
     """Read a bpy mesh into numpy. All arrays are copies: nothing refers to Blender's memory afterwards.
 
-    ``owner`` names the object in warnings. A mesh without one good triangle comes back with no triangles.
+    ``owner`` names the object in warnings; ``wanted`` the attributes that are read, "" for the active colour. A mesh
+    without one good triangle comes back with no triangles.
     """
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
@@ -52,6 +67,7 @@ def read_mesh(mesh, key: Hashable, owner: str) -> Mesh:
         return _empty(key, warnings)
     if not _is_identity(order, count):
         corners, triangle_points, face_normals = corners[order], triangle_points[order], face_normals[order]
+    middle, half = (np.array(v, np.float32) for v in (mesh.texspace_location, mesh.texspace_size))
     flat = np.ascontiguousarray(corners).reshape(-1)
     points = np.ascontiguousarray(triangle_points).reshape(-1, 3)
     return Mesh(
@@ -63,6 +79,8 @@ def read_mesh(mesh, key: Hashable, owner: str) -> Mesh:
         slots=_slot_ranges(triangle_slots[order]),
         bounds=np.stack((points.min(axis=0), points.max(axis=0))),
         warnings=warnings,
+        attributes=_attributes(mesh, flat, order, wanted),
+        texture_space=np.stack((middle - half, middle + half)),
     )
 
 
@@ -155,6 +173,37 @@ def _uvs(mesh, corners: Array) -> dict[str, Array]:
     return uvs
 
 
+def _attributes(mesh, corners: Array, triangles: Array, wanted: Iterable[str]) -> dict[str, Array]:
+    """(3T, 4) float32 each, a number as a grey and what has no alpha with 1. Those that are not there are left out."""
+    found = {}
+    for name in wanted:
+        attribute = _attribute(mesh, name)
+        layer = LAYERS.get(attribute.data_type) if attribute is not None else None
+        if attribute is None or layer is None or layer[1] > 4 or attribute.domain not in {"POINT", "CORNER", "FACE"}:
+            continue
+        width = layer[1]
+        values = _layer(attribute.data, *layer).reshape(-1, width)
+        if attribute.domain == "POINT":
+            rows = _corner_vertices(mesh).take(corners)
+        elif attribute.domain == "CORNER":
+            rows = corners
+        else:
+            rows = np.repeat(_layer(mesh.loop_triangle_polygons, "value", 1, np.int32)[triangles], 3)
+        array = np.zeros((len(corners), 4), np.float32)
+        array[:, 3] = 1.0
+        array[:, : max(width, 3) if width == 1 else width] = values.take(rows, axis=0)
+        found[name] = np.nan_to_num(array, nan=0.0, posinf=0.0, neginf=0.0)
+    return found
+
+
+def _attribute(mesh, name: str):
+    """An attribute of a bpy mesh by name, "" for the colour that is marked for render; None where it is not there."""
+    if name:
+        return mesh.attributes.get(name)
+    index = mesh.color_attributes.render_color_index
+    return mesh.color_attributes[index] if 0 <= index < len(mesh.color_attributes) else None
+
+
 def _active_uv(mesh) -> str:
     """The UV map marked for render (the camera icon), which is what a texture without a UV Map node uses."""
     for layer in mesh.uv_layers:
@@ -174,24 +223,9 @@ def _content_hash(mesh) -> bytes:
         digest.update(_layer(mesh.loop_triangle_polygons, "value", 1, np.int32).data)
         digest.update(_layer(mesh.corner_normals, "vector", 3, np.float32).data)
     for attribute in mesh.attributes:
-        known = _ATTRIBUTE_TYPES.get(attribute.data_type)
+        known = LAYERS.get(attribute.data_type)
         if known and attribute.domain != "EDGE" and not attribute.name.startswith("."):
             digest.update(f"{attribute.name} {attribute.domain} {attribute.data_type}".encode())
             digest.update(_layer(attribute.data, *known).data)
+    digest.update(np.array((*mesh.texspace_location, *mesh.texspace_size), np.float32).data)
     return digest.digest()
-
-
-# What foreach_get is asked for, numbers each, and their dtype.
-_ATTRIBUTE_TYPES = {
-    "FLOAT": ("value", 1, np.float32),
-    "INT": ("value", 1, np.int32),
-    "INT8": ("value", 1, np.int8),
-    "BOOLEAN": ("value", 1, np.bool_),
-    "FLOAT_VECTOR": ("vector", 3, np.float32),
-    "FLOAT2": ("vector", 2, np.float32),
-    "INT32_2D": ("value", 2, np.int32),
-    "FLOAT_COLOR": ("color", 4, np.float32),
-    "BYTE_COLOR": ("color", 4, np.float32),
-    "QUATERNION": ("value", 4, np.float32),
-    "FLOAT4X4": ("value", 16, np.float32),
-}

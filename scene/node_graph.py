@@ -74,13 +74,25 @@ class NodeGraph:
     surface: Link | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class ReadGraph:
-    """A graph with its numbers, and what of the material could not be read."""
+@dataclass(frozen=True)
+class FilledGraph:
+    """A graph with its numbers and images: all that a surface is drawn by."""
 
     graph: NodeGraph
-    values: np.ndarray  # (texels, 4) float32
+    values: bytes = b""  # (texels, 4) float32
     images: tuple[Hashable, ...] = ()  # keys of Scene.images, by Node.image
+
+    @property
+    def table(self) -> np.ndarray:
+        """The values, (texels, 4) float32."""
+        return np.frombuffer(self.values, np.float32).reshape(-1, TEXEL)
+
+
+@dataclass(frozen=True)
+class ReadGraph:
+    """What was read of a node tree, and what could not be."""
+
+    filled: FilledGraph
     unsupported: tuple[str, ...] = ()  # one clause for each node, naming it and what is shown instead
 
 

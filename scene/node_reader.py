@@ -9,8 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
+import bpy
+
 from ..gpu_shaders.materials import gives, is_supported
-from .node_graph import COLOR, FLOAT, SHADER, VECTOR, Input, Link, Node, NodeGraph, Place, ReadGraph, Slot, Values
+from .node_graph import (
+    COLOR,
+    FLOAT,
+    SHADER,
+    VECTOR,
+    FilledGraph,
+    Input,
+    Link,
+    Node,
+    NodeGraph,
+    Place,
+    ReadGraph,
+    Slot,
+    Values,
+)
 from .node_tables import curve_rows
 from .nodes import MAX_STEPS, Socket, active_output, find_input, node_tree, step_back
 
@@ -43,15 +59,17 @@ def read_graph(material, read_image: ReadImage) -> ReadGraph:
     else:
         output = active_output(tree)
         socket = find_input(output, "Surface") if output else None
+        if output:
+            reader.displace(find_input(output, "Displacement"))
         if socket:
             reader.read_inputs_first(socket)
         surface = reader.source(socket, SHADER).source if socket else None
     if isinstance(surface, Slot) and socket and socket.socket.is_linked:
         surface = reader.constant(surface)
     link = surface if isinstance(surface, Link) else None
-    return ReadGraph(
-        NodeGraph(tuple(reader.nodes), link), reader.values.array(), tuple(reader.images), tuple(reader.unsupported)
-    )
+    graph = NodeGraph(tuple(reader.nodes), link)
+    filled = FilledGraph(graph, reader.values.array().tobytes(), tuple(reader.images))
+    return ReadGraph(filled, tuple(reader.unsupported))
 
 
 class _Reader:
@@ -60,6 +78,7 @@ class _Reader:
         self.values = Values()
         self.images: dict[Hashable, None] = {}
         self.unsupported: dict[str, None] = {}
+        self._normal: Link | Place = Place("normal")  # what normals are that nothing is linked to
         self._read_image = read_image
         self._links: dict[tuple, int | None] = {}  # None: being read
         self._depth = 0
@@ -85,6 +104,26 @@ class _Reader:
         self._depth += 1
         self._links[key] = self._node(found)
         self._depth -= 1
+
+    def displace(self, socket: Socket | None) -> None:
+        """Have a Displacement node's height as a bump under all shaders: what it does to light, if not to outlines."""
+        found = self._follow(socket)[0] if socket else None
+        if socket is None or found is None or not found.socket.is_output or found.node.mute:
+            return
+        height, scale = found.input("Height"), found.input("Scale")
+        if found.node.bl_idname != "ShaderNodeDisplacement" or height is None or scale is None:
+            self._name(found.node, "is not supported, nothing is displaced")
+            return
+        self.read_inputs_first(height)
+        self.read_inputs_first(scale)
+        inputs = (
+            Input("Height", FLOAT, self.source(height, FLOAT).source),
+            Input("Strength", FLOAT, self.values.add(FLOAT, (1.0,))),
+            Input("Distance", FLOAT, self.source(scale, FLOAT).source),
+            Input("Normal", VECTOR, self._normal),
+        )
+        self.nodes.append(Node("ShaderNodeBump", inputs, (("Normal", VECTOR),), (("invert", False),)))
+        self._normal = Link(len(self.nodes) - 1, "Normal")
 
     # Where values come from
 
@@ -114,11 +153,11 @@ class _Reader:
             numbers += TYPES.get(at.socket.type) == FLOAT
         return at, numbers > 0
 
-    def _constant(self, socket: Socket, found: Socket) -> Slot | Place | None:
+    def _constant(self, socket: Socket, found: Socket) -> Slot | Link | Place | None:
         node, own = socket.node, found.socket == socket.socket
         name = socket.socket.identifier
         if own and name in NORMALS:
-            return Place("normal")
+            return self._normal
         if own and name == "Vector" and node.bl_idname.startswith("ShaderNodeTex"):
             if node.bl_idname == "ShaderNodeTexEnvironment":
                 return Place("position")
@@ -167,6 +206,8 @@ class _Reader:
             return self._image(found)
         table = curve_rows(node)
         extra, options = self._properties(node)
+        if node.bl_idname == "ShaderNodeTexVoronoi" and bpy.app.version < (5, 0, 0):
+            options.append(("float_hash", True))  # its cells lay elsewhere
         if table is not None:
             rows, low, high, extended = table
             extra += [("low", self.values.add(FLOAT, (low,))), ("high", self.values.add(FLOAT, (high,)))]
@@ -267,7 +308,7 @@ class _Reader:
 
     def _diffuse(self, color: Input) -> Link:
         roughness = Input("Roughness", FLOAT, self.values.add(FLOAT, (0.0,)))
-        normal = Input("Normal", VECTOR, Place("normal"))
+        normal = Input("Normal", VECTOR, self._normal)
         self.nodes.append(Node("ShaderNodeBsdfDiffuse", (color, roughness, normal), (("BSDF", SHADER),)))
         return Link(len(self.nodes) - 1, "BSDF")
 

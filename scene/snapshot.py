@@ -124,7 +124,7 @@ class _Writer:
     def _kind(self, value: object) -> str:
         name = type(value).__name__
         if KINDS.get(name) is not type(value):
-            raise TypeError(f"a snapshot has no place for {name}, which is not of scene.data")
+            raise TypeError(f"a snapshot has no place for {name}, which is not of the scene's data")
         return name
 
     def _place(self, array: np.ndarray) -> dict[str, Any]:

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .data import Array, Material, Mesh, Scene
+from .data import LUMINANCE, Array, Material, Mesh
 
-# Rec. 709 luminance of scene-linear RGB.
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Cells along each side of a face of the cube that directions are sorted by. Odd: the axes lie in the middle of cells.
 _CELLS_A_SIDE = 3
 # At most so many objects are huge: those that have so many times the area of all others.
@@ -35,7 +33,9 @@ class Part:
     first_instance: int
     instance_count: int
     material: int
-    uv_maps: tuple[str, str]  # of base colour and emission, "" for none
+    attributes: tuple[
+        tuple[str, str], ...
+    ] = ()  # what its material asks of a mesh: Mesh.corner_attribute()'s arguments
     density: float = 1.0  # how many points an area gets, against other parts
 
     @property
@@ -45,7 +45,7 @@ class Part:
     @property
     def layout(self) -> tuple:
         """All but the matrices that points depend on."""
-        return self.key, self.first_instance, self.instance_count, self.material, self.uv_maps, self.density
+        return self.key, self.first_instance, self.instance_count, self.material, self.attributes, self.density
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +61,18 @@ class Points:
     positions: Array  # (n, 3) float64
     normals: Array  # (n, 3) float64: shading normal, interpolated and not unit
     geometric_normals: Array  # (n, 3) float64: unit normal of the triangle
-    base_uvs: Array  # (n, 2) float64
-    emission_uvs: Array  # (n, 2) float64
+    backfacing: Array  # (n,) float64: 1 where a point is on the side that the mesh's faces look away from
+    attributes: Array  # (n, k, 4) float64: by Part.attributes, k the most that a part has; what is not there is 0
     weights: Array  # (n,) float64, m²
 
     def __len__(self) -> int:
         return len(self.weights)
 
 
-_NO_ROWS, _NO_VECTORS, _NO_UVS = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 2))
-_NO_POINTS = Points(_NO_ROWS, _NO_ROWS, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, _NO_UVS, _NO_UVS, weights=np.zeros(0))
+_NO_ROWS, _NO_VECTORS = np.zeros(0, np.int64), np.zeros((0, 3))
+_NO_POINTS = Points(
+    _NO_ROWS, _NO_ROWS, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, np.zeros(0), np.zeros((0, 0, 4)), weights=np.zeros(0)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +142,9 @@ class SurfaceSampler:
         return [self._triangles[part.key] for part in parts]
 
 
-def emission_density(material: Material, scene: Scene, image_means: dict[Hashable, Array]) -> float:
-    """Luminance of what a material emits, on average over its image. ``image_means`` remembers those of images."""
-    emission = np.asarray(material.emission, np.float64)
-    lookup = material.emission_texture
-    if lookup is not None and emission.any() and lookup.image in scene.images:
-        if lookup.image not in image_means:
-            image_means[lookup.image] = scene.images[lookup.image].pixels[..., :3].mean((0, 1), dtype=np.float64)
-        emission = emission * image_means[lookup.image]
-    return float(np.maximum(emission, 0.0) @ LUMINANCE)
+def emission_density(material: Material) -> float:
+    """Luminance of what a material emits, on average over it."""
+    return float(np.maximum(np.asarray(material.emission, np.float64), 0.0) @ LUMINANCE)
 
 
 def cofactor_matrices(matrices: Array) -> Array:
@@ -254,12 +250,11 @@ def _choose(entries: _Entries, place: Array) -> tuple[Array, Array, Array]:
 
 def _gather(parts: Sequence[Part], triangles: Sequence[_Triangles], part: Array, cell: Array, within: Array) -> dict:
     """What the meshes hold at the corners of each point's triangle."""
-    count = len(part)
+    count, most = len(part), max((len(p.attributes) for p in parts), default=0)
     found = {
         "positions": np.zeros((count, 3, 3)),
         "normals": np.zeros((count, 3, 3)),
-        "base_uvs": np.zeros((count, 3, 2)),
-        "emission_uvs": np.zeros((count, 3, 2)),
+        "attributes": np.zeros((count, 3, 4 * most)),
         "cell_area": np.zeros(count),
     }
     order = np.argsort(part, kind="stable")
@@ -272,12 +267,12 @@ def _gather(parts: Sequence[Part], triangles: Sequence[_Triangles], part: Array,
         target = np.minimum(low + within[mine] * (high - low), np.nextafter(high, 0.0))
         triangle = known.order[np.searchsorted(known.areas, target, "right")] + parts[number].first_triangle
         found["cell_area"][mine] = high - low
-        layers = {"positions": mesh.positions, "normals": mesh.normals}
-        for name, uv_map in zip(("base_uvs", "emission_uvs"), parts[number].uv_maps, strict=True):
-            if uv_map in mesh.uvs:
-                layers[name] = mesh.uvs[uv_map]
-        for name, layer in layers.items():
+        for name, layer in {"positions": mesh.positions, "normals": mesh.normals}.items():
             found[name][mine] = layer.reshape(-1, 3, layer.shape[1])[triangle]
+        for place, named in enumerate(parts[number].attributes):
+            layer = mesh.corner_attribute(*named)
+            width = layer.shape[1]
+            found["attributes"][mine, :, 4 * place : 4 * place + width] = layer.reshape(-1, 3, width)[triangle]
     return found
 
 
@@ -285,13 +280,12 @@ def _place(corners: dict, numbers: Array, side: Array) -> dict:
     """Points within their triangles; ``numbers`` (n, 2) in [0, 1)."""
     root = np.sqrt(numbers[:, 0])
     shares = np.stack((1.0 - root, root * (1.0 - numbers[:, 1]), root * numbers[:, 1]), -1)
-    points = {
-        name: np.einsum("nc,ncd->nd", shares, corners[name])
-        for name in ("positions", "normals", "base_uvs", "emission_uvs")
-    }
+    points = {name: np.einsum("nc,ncd->nd", shares, corners[name]) for name in ("positions", "normals", "attributes")}
+    points["attributes"] = points["attributes"].reshape(len(numbers), -1, 4)
     a, b, c = corners["positions"].swapaxes(0, 1)
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     points["geometric_normals"] = normal * side[:, None]
     points["normals"] *= side[:, None]
+    points["backfacing"] = (side < 0.0).astype(np.float64)
     return points

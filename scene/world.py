@@ -32,10 +32,11 @@ def read_world(world, images: ImageReader, warn: Callable[[str], None]) -> World
     problems = [*read.unsupported, *_of_the_picture(read)]
     if problems:
         warn(f"World '{world.name}': {'; '.join(problems)}")
-    if read.graph.surface is None:
+    if read.filled.graph.surface is None:
         return World()
-    values = tuple(read.values.ravel().tolist())
-    return World(graph=read.graph, values=values, images=read.images, **_settings(world))
+    filled = read.filled
+    values = tuple(filled.table.ravel().tolist())
+    return World(graph=filled.graph, values=values, images=filled.images, **_settings(world))
 
 
 def _one_color(surface: Socket) -> RGB | None:
@@ -67,8 +68,10 @@ def _settings(world) -> dict:
 
 def _of_the_picture(read: ReadGraph) -> list[str]:
     """A clause for each coordinate that is another one in every picture."""
-    links = {given.source for node in read.graph.nodes for given in node.inputs if isinstance(given.source, Link)}
-    used = {link.output for link in links if read.graph.nodes[link.node].kind == "ShaderNodeTexCoord"}
+    links = {
+        given.source for node in read.filled.graph.nodes for given in node.inputs if isinstance(given.source, Link)
+    }
+    used = {link.output for link in links if read.filled.graph.nodes[link.node].kind == "ShaderNodeTexCoord"}
     return [
         f"its {name} coordinates light the scene as those of {how}"
         for name, how in OF_THE_PICTURE.items()

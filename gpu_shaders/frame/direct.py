@@ -15,7 +15,7 @@ from .inputs import FrameInputs
 from .light_maps import LightMaps, MapTile
 from .lights import emitter_sample, has_size, light_row
 from .maps import FILTER_OVERLAP, Face, light_faces
-from .shaders import DIRECT, SHADOW
+from .shaders import DIRECT, SHADOW, SHADOW_PASSING
 from .structs import LIGHT, MAP_FACE
 
 if TYPE_CHECKING:
@@ -73,10 +73,10 @@ class DirectLight:
         key = (inputs.gpu_scene.revision, filtered, resolution)
         if key != self._up_to_date:
             self._up_to_date, self._faces_of_still_lights = None, {}
-        elif not self._any_moves(inputs, filtered):
+        elif not self._any_moves(inputs, filtered) and not len(inputs.gpu_scene.passing_boxes):
             return
         self._lay_out(inputs, filtered, resolution)
-        yield from self._draw_shadows(inputs.gpu_scene)
+        yield from self._draw_shadows(inputs.gpu_scene, inputs.noise_seed(4) + inputs.sample)
         self._up_to_date = key
 
     def _any_moves(self, inputs: FrameInputs, filtered: bool) -> bool:
@@ -91,7 +91,7 @@ class DirectLight:
             source = emitter_sample(light, inputs.sample, _offset(inputs.seed, index)) if moves else None
             faces = self._faces(light, inputs.gpu_scene.boxes, source)
             rows.append(light_row(light, source, len(tiles), len(faces)))
-            tiles += [MapTile(light.key, index, face) for face in faces]
+            tiles += [MapTile(light.key, index, face, _look(face, inputs)) for face in faces]
             one_face = light.kind in (LightKind.SPOT, LightKind.SUN) and len(faces) == 1
             only_tiles.append(tiles[-1] if one_face else None)
         self.maps.lay_out(tiles, resolution)
@@ -115,23 +115,24 @@ class DirectLight:
             self._faces_of_still_lights[light.key] = light_faces(light, boxes, overlap=overlap)
         return self._faces_of_still_lights[light.key]
 
-    def _draw_shadows(self, gpu_scene: GpuScene) -> Iterator[float]:
+    def _draw_shadows(self, gpu_scene: GpuScene, dither: int) -> Iterator[float]:
         stale = self.maps.stale(gpu_scene)
         for done, tile in enumerate(stale):
             target, viewport = self.maps.begin(tile, gpu_scene)
             draws = visible_draws(gpu_scene, Visibility.SHADOW, tile.face.sees)
-            draw_scene(
-                self.device,
-                gpu_scene,
-                SHADOW,
-                target,
-                draws,
-                viewport=viewport,
-                pc_clip_from_world=tile.face.clip_from_world,
-                pc_perspective=int(tile.face.perspective),
-                pc_far=tile.face.far,
-                pc_tile=float(viewport[2]),
-            )
+            passing = [gpu_scene.lets_pass(draw.material) for draw in draws]
+            face = {
+                "pc_clip_from_world": tile.face.clip_from_world,
+                "pc_perspective": int(tile.face.perspective),
+                "pc_far": tile.face.far,
+                "pc_tile": float(viewport[2]),
+            }
+            solid = [draw for draw, passes in zip(draws, passing, strict=True) if not passes]
+            draw_scene(self.device, gpu_scene, SHADOW, target, solid, viewport=viewport, **face)
+            if any(passing):
+                extra = {"pc_eye": tile.face.eye, "pc_dither": dither}
+                thin = [draw for draw, passes in zip(draws, passing, strict=True) if passes]
+                draw_scene(self.device, gpu_scene, SHADOW_PASSING, target, thin, viewport=viewport, **face, **extra)
             yield (done + 1) / len(stale)
 
     def _shade(self, inputs: FrameInputs, target: Target, index: int, lamp: _Lamp, glossy: bool) -> None:
@@ -151,6 +152,11 @@ class DirectLight:
             pc_sample=inputs.sample,
             **extra,
         )
+
+
+def _look(face: Face, inputs: FrameInputs) -> bytes:
+    """What else a map is drawn by: what lets light pass is drawn anew in every sample."""
+    return str(inputs.sample).encode() if face.sees(inputs.gpu_scene.passing_boxes).any() else b""
 
 
 def _offset(seed: int, light: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from ...device.interface import Device, DrawState, Target, Viewport
 from ...device.shader import Shader
 from ...scene.data import Visibility
+from .material_pass import material_program
 
 if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
@@ -38,21 +40,27 @@ def draw_scene(
     **shared: Any,
 ) -> None:
     """Draw, with depth test unless ``state`` says otherwise. ``each`` gives what the shader wants to know of a draw
-    beside its instances.
+    beside its instances and, if it asks for materials, its material.
     """
     shared["instance_tx"] = gpu_scene.instance_table
-    with device.drawing(shader, target, state=state, viewport=viewport, **shared) as draw_call:
-        for draw in draws:
-            draw_call(
-                draw.vertices,
-                first=draw.first_vertex,
-                count=draw.vertex_count,
-                instances=draw.instance_count,
-                pc_first_instance=draw.first_instance,
-                **each(draw),
-            )
-
-
-def material_of(gpu_scene: GpuScene, draw: Draw) -> dict[str, Any]:
-    """What a shader that evaluates materials wants to know of a draw; it reads the material table as well."""
-    return {"pc_material": draw.material, **gpu_scene.textures_of(draw.material)}
+    asks = "material_tx" in shader.samplers
+    if asks:
+        shared["material_tx"] = gpu_scene.material_table
+    programs: dict[Shader, list[Draw]] = defaultdict(list)
+    for draw in draws:
+        code = gpu_scene.code_of(draw.material) if asks else None
+        programs[material_program(shader, code, asks and gpu_scene.lets_pass(draw.material))].append(draw)
+    for program, members in programs.items():
+        common = shared | (gpu_scene.material_inputs(program) if asks else {})
+        with device.drawing(program, target, state=state, viewport=viewport, **common) as draw_call:
+            for draw in members:
+                own = gpu_scene.own_inputs(draw.material) if asks else {}
+                draw_call(
+                    draw.vertices,
+                    first=draw.first_vertex,
+                    count=draw.vertex_count,
+                    instances=draw.instance_count,
+                    pc_first_instance=draw.first_instance,
+                    **own,
+                    **each(draw),
+                )

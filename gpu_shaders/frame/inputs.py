@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Seeds that one use of noise may count on from its own, as many as two for each of 2048 lights; and uses in a frame.
 # With a frame's seed of up to 65535 all of them fit a shader's signed integer.
-SEEDS_A_STREAM, STREAMS = 1 << 12, 4
+SEEDS_A_STREAM, STREAMS = 1 << 12, 5
 
 
 @dataclass(frozen=True, eq=False)

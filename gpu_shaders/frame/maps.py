@@ -71,6 +71,12 @@ class Face:
             clip[2, 2], clip[2, 3], clip[3, 3] = 2 / self.far, -1, 1
         return clip @ self.face_from_world
 
+    @property
+    def eye(self) -> tuple[float, float, float, float]:
+        """The light's position and 1, or of an orthographic map the unit direction to the light and 0."""
+        rotation, offset = self.face_from_world[:3, :3], self.face_from_world[:3, 3]
+        return (*(-rotation.T @ offset).tolist(), 1.0) if self.perspective else (*(-rotation[2]).tolist(), 0.0)
+
     def metres(self, depth: np.ndarray) -> np.ndarray:
         """Distance along the face's axis from what its map holds as depth, float32: map_depth() inverted."""
         if not self.perspective:

@@ -3,8 +3,11 @@
  * receiver's cosine is not in it: it cancels against the surface's projected area. */
 #include "frame/light_lib.glsl"
 #include "frame/map_lib.glsl"
-#include "frame/surface_lib.glsl"
+#include "frame/material_mesh_lib.glsl"
 #include "lib/lobe_lib.glsl"
+#ifdef MATERIAL_PASSES
+#include "frame/material_dither_lib.glsl"
+#endif
 
 /* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond
  * this cosine. */
@@ -16,8 +19,8 @@ void main()
   vec3 to_light = light.kind == LIGHT_SUN ? light.axis_z : light.position - v_position;
   float distance_squared = light.kind == LIGHT_SUN ? 1.0 : max(dot(to_light, to_light), 1e-20);
   vec3 d = to_light * inversesqrt(max(dot(to_light, to_light), 1e-20));
-  vec3 geometric = surface_geometric_normal(v_position, d);
-  vec3 normal = surface_shading_normal(v_normal, geometric);
+  MaterialPlace place = material_place(d);
+  vec3 geometric = place.geometric;
 
   /* The solid angle of the texel (sun: its area across the light): pc_texel_measure is its area at z = 1, and
    * cos^3 turns that into solid angle. z / distance is the cosine to the face's axis. */
@@ -26,9 +29,14 @@ void main()
     float cosine = 1.0 / (gl_FragCoord.w * sqrt(distance_squared));
     measure *= cosine * cosine * cosine;
   }
-  Surface surface =
-      surface_evaluate(material_fetch(material_tx, pc_material), base_tx, emission_tx, v_base_uv, v_emission_uv);
-  surface = surface_toward(surface, dot(normal, d));
+  Surface surface = material_evaluate(place);
+  surface = surface_toward(surface, dot(place.normal, d));
+#ifdef MATERIAL_PASSES
+  if (material_is_passed(surface.coverage)) {
+    discard;
+  }
+  surface = surface_drawn(surface);
+#endif
   float reflects = float(pc_reflects);
   /* A sun's wide map sends no light from where the one inside it does. */
   if (pc_served >= 0) {
@@ -44,7 +52,7 @@ void main()
 
   gl_FragDepth = pc_perspective != 0 ? map_depth(1.0 / (pc_far * gl_FragCoord.w)) : clamp(gl_FragCoord.z, 0.0, 1.0);
   out_position_area = vec4(v_position, area);
-  out_normal = vec4(normal, float(SOURCE_BOUNCE));
+  out_normal = vec4(place.normal, float(SOURCE_BOUNCE));
   out_flux = vec4(flux * surface.albedo, 1.0);
   out_specular = vec4(flux * surface.specular, lobe_pack(surface.roughness, d));
 }

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...device.interface import Device, Texture
 from ...scene.data import Visibility
-from .draws import draw_scene, material_of, visible_draws
+from .draws import draw_scene, visible_draws
 from .light_maps import LightMaps, MapTile
 from .lights import light_row
 from .maps import light_faces
@@ -112,7 +112,7 @@ class ReflectiveShadowMaps(LightMaps):
         draws = visible_draws(gpu_scene, Visibility.SHADOW | Visibility.BOUNCE, tile.face.sees)
 
         def each(draw: Draw) -> dict:
-            return {"pc_reflects": int(bool(draw.visibility & Visibility.BOUNCE)), **material_of(gpu_scene, draw)}
+            return {"pc_reflects": int(bool(draw.visibility & Visibility.BOUNCE))}
 
         draw_scene(
             self.device,
@@ -122,7 +122,6 @@ class ReflectiveShadowMaps(LightMaps):
             draws,
             each,
             viewport,
-            material_tx=gpu_scene.material_table,
             light_tx=self.light_table,
             pc_clip_from_world=tile.face.clip_from_world,
             pc_light=tile.light,
@@ -131,6 +130,7 @@ class ReflectiveShadowMaps(LightMaps):
             pc_texel_measure=tile.face.texel_measure / viewport[2] ** 2,
             face_tx=self.face_table,
             pc_served=self._served_by(tile),
+            pc_dither=0,
         )
 
     def _served_by(self, tile: MapTile) -> int:

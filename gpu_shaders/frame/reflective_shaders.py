@@ -4,7 +4,7 @@ from enum import IntEnum
 
 from ...device.shader import Shader
 from .shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
-from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+from .structs import INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 
 class SourceKind(IntEnum):
@@ -37,7 +37,8 @@ REFLECT = Shader(
         "pc_far": "FLOAT",
         "pc_texel_measure": "FLOAT",  # see reflective_draw_frag.glsl
         "pc_served": "INT",
+        "pc_dither": "INT",
     },
-    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES, *SOURCE_DEFINES),
+    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *SOURCE_DEFINES, ("MATERIAL_CAMERA_RAY", "0")),
     depth_write=True,
 )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...device.shader import Shader
 from ...scene.data import LightKind
-from .structs import IMAGE_DEFINES, INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+from .structs import INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 # What a picture can keep a sum of.
 SUMS = (
@@ -19,14 +19,9 @@ SUMS = (
     "glossy_color",
 )
 
-MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3", "in_base_uv": "VEC2", "in_emission_uv": "VEC2"}
-MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3", "v_base_uv": "VEC2", "v_emission_uv": "VEC2"}
-MESH_SAMPLERS = {
-    "instance_tx": "FLOAT_2D",
-    "material_tx": "FLOAT_2D",
-    "base_tx": "FLOAT_2D",
-    "emission_tx": "FLOAT_2D",
-}
+MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3"}
+MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3"}
+MESH_SAMPLERS = {"instance_tx": "FLOAT_2D", "material_tx": "FLOAT_2D"}
 
 GBUFFER = Shader(
     name="frame_gbuffer",
@@ -50,9 +45,18 @@ GBUFFER = Shader(
         "pc_material": "INT",
         "pc_holdout": "INT",
         "pc_no_indirect": "INT",
+        "pc_dither": "INT",
     },
-    defines=IMAGE_DEFINES,
+    defines=(("MATERIAL_CAMERA_RAY", "1"),),
 )
+
+_SHADOW_CONSTANTS = {
+    "pc_clip_from_world": "MAT4",
+    "pc_first_instance": "INT",
+    "pc_perspective": "INT",
+    "pc_far": "FLOAT",
+    "pc_tile": "FLOAT",
+}
 
 SHADOW = Shader(
     name="shadow_draw",
@@ -63,14 +67,23 @@ SHADOW = Shader(
     outputs={"out_slope": "VEC4"},
     samplers={"instance_tx": "FLOAT_2D"},
     structs=(INSTANCE, MAP_FACE),
-    constants={
-        "pc_clip_from_world": "MAT4",
-        "pc_first_instance": "INT",
-        "pc_perspective": "INT",
-        "pc_far": "FLOAT",
-        "pc_tile": "FLOAT",
-    },
+    constants=_SHADOW_CONSTANTS,
     defines=MAP_DEFINES,
+    depth_write=True,
+)
+
+# Of materials that let light pass.
+SHADOW_PASSING = Shader(
+    name="shadow_passing",
+    vertex="frame/frame_draw_vert.glsl",
+    fragment="frame/shadow_passing_frag.glsl",
+    inputs=MESH_INPUTS,
+    varyings={**MESH_VARYINGS, "v_depth": "FLOAT"},
+    outputs={"out_slope": "VEC4"},
+    samplers=MESH_SAMPLERS,
+    structs=(INSTANCE, MATERIAL, MAP_FACE),
+    constants={**_SHADOW_CONSTANTS, "pc_eye": "VEC4", "pc_material": "INT", "pc_dither": "INT"},
+    defines=(*MAP_DEFINES, ("MATERIAL_CAMERA_RAY", "0"), ("MAP_DEPTH", "1")),
     depth_write=True,
 )
 
@@ -180,4 +193,4 @@ _ACCUMULATE = tuple(
     for lit, panorama in ((False, False), (True, False), (True, True))
 )
 
-SHADERS = (GBUFFER, SHADOW, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)
+SHADERS = (GBUFFER, SHADOW, SHADOW_PASSING, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)

@@ -5,25 +5,33 @@ from ...scene.data import LightKind
 from .maps import FAR_BITS, NEAR_BITS
 
 LIGHT_KINDS = {kind: number for number, kind in enumerate(LightKind)}
-IMAGE_CLOSEST, IMAGE_EXTEND = 1, 2  # bits of MATERIAL's modes
 
 LIGHT_DEFINES = tuple((f"LIGHT_{kind.name}", str(number)) for kind, number in LIGHT_KINDS.items())
 MAP_DEFINES = (("MAP_NEAR_BITS", str(NEAR_BITS)), ("MAP_FAR_BITS", str(FAR_BITS)))
-IMAGE_DEFINES = (("IMAGE_CLOSEST", str(IMAGE_CLOSEST)), ("IMAGE_EXTEND", str(IMAGE_EXTEND)))
 
-INSTANCE = Struct("Instance", world_from_object="mat4")
+INSTANCE = Struct(
+    "Instance",
+    world_from_object="mat4",
+    color="vec4",  # what Object Info tells of it, as `random` and `index`
+    texture_origin="vec3",  # generated coordinates: (object_position - texture_origin) * texture_scale
+    random="float",
+    texture_scale="vec3",
+    index="float",
+)
 
 MATERIAL = Struct(
     "Material",
     base_color="vec3",
-    base_mode="int",  # -1: no texture; else IMAGE_* bits
-    emission="vec3",  # radiance, W/(m² sr)
-    emission_mode="int",
-    specular="vec3",  # reflectance at normal incidence of the dielectric part, 0: none
     metallic="float",  # how much of base_color is specular reflectance, the rest is diffuse
+    emission="vec3",  # radiance, W/(m² sr)
     roughness="float",
+    specular="vec3",  # reflectance at normal incidence of the dielectric part, 0: none
     layered="float",  # how much of `specular` lies over the diffuse part and takes from it
+    index="float",
 )
+
+# The camera, for materials that ask where they are seen.
+MATERIAL_VIEW = Struct("MaterialView", camera_from_world="mat4", window_from_world="mat4")
 
 LIGHT = Struct(
     "Light",

@@ -1,14 +1,26 @@
-/* The material at a fragment: what the full node graph will replace. */
+/* A surface as the frame lights it, and the place on it that a material is asked about. */
 #include "lib/bxdf_lib.glsl"
-#include "lib/image_lib.glsl"
 
 struct Surface {
   vec3 albedo;   /* diffuse reflectance, 0..1 */
   vec3 specular; /* specular reflectance at normal incidence; black where there is no lobe */
   float roughness;
-  vec3 emission; /* radiance, W/(m^2 sr) */
-  vec3 diffuse;  /* diffuse reflectance without the layer over it */
-  vec3 layer;    /* specular reflectance of that layer at normal incidence */
+  vec3 emission;     /* radiance, W/(m^2 sr) */
+  vec3 diffuse;      /* diffuse reflectance without the layer over it */
+  vec3 layer;        /* specular reflectance of that layer at normal incidence */
+  vec3 transparent;  /* what passes straight on */
+  vec3 transmission; /* what passes on of what the lobe leaves */
+  float coverage;    /* 0..1: of light that does not pass on */
+};
+
+struct MaterialPlace {
+  vec3 position;
+  vec3 normal;    /* unit, shading, on the viewer's side; material_evaluate() bends it */
+  vec3 geometric; /* unit, on the viewer's side */
+  vec3 toward;    /* unit, to the viewer */
+  vec3 object_position;
+  int instance;
+  float backfacing;
 };
 
 /* The surface seen from a direction of this cosine to the shading normal: the layer takes from the diffuse part what it
@@ -19,29 +31,23 @@ Surface surface_toward(Surface surface, float cosine)
   if (surface.layer != vec3(0.0)) {
     taken = bxdf_albedo(surface.layer, surface.roughness, cosine);
   }
-  surface.albedo = surface.diffuse * (1.0 - max(taken.r, max(taken.g, taken.b)));
+  float left = 1.0 - max(taken.r, max(taken.g, taken.b));
+  surface.albedo = surface.diffuse * left;
+  vec3 passing = surface.transparent + surface.transmission * left;
+  surface.coverage = 1.0 - clamp((passing.r + passing.g + passing.b) / 3.0, 0.0, 1.0);
   return surface;
 }
 
-/* As it looks on average from all sides; surface_toward() tells what it does from one. */
-Surface surface_evaluate(Material material, sampler2D base_tx, sampler2D emission_tx, vec2 base_uv, vec2 emission_uv)
+/* What is drawn in one sample of several stands for those in which the surface let everything pass. */
+Surface surface_drawn(Surface surface)
 {
-  Surface surface;
-  vec3 base = material.base_color;
-  if (material.base_mode >= 0) {
-    base = image_sample(base_tx, base_uv, material.base_mode).rgb;
+  if (surface.coverage < 1.0) {
+    float often = 1.0 / max(surface.coverage, 1e-3);
+    surface.albedo = min(surface.albedo * often, vec3(1.0));
+    surface.specular = min(surface.specular * often, vec3(1.0));
+    surface.emission *= often;
   }
-  /* A reflectance above 1 would make energy: the one limit put on a material. */
-  base = clamp(base, vec3(0.0), vec3(1.0));
-  surface.diffuse = base * (1.0 - material.metallic);
-  surface.specular = mix(material.specular, base, material.metallic);
-  surface.layer = material.specular * material.layered;
-  surface.roughness = material.roughness;
-  surface.emission = material.emission;
-  if (material.emission_mode >= 0) {
-    surface.emission *= image_sample(emission_tx, emission_uv, material.emission_mode).rgb;
-  }
-  return surface_toward(surface, BXDF_MEAN_COSINE);
+  return surface;
 }
 
 /* The unit normal of the triangle itself, on the side of `eye_direction` (from the surface to the viewer). */

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,9 +12,10 @@ from ...device.structs import Struct
 from ...scene.data import Material, Visibility
 from ...scene.surface_points import Part, Points, SurfaceSampler, emission_density, gram_matrices
 from .draws import visible_draws
+from .material_pass import material_program
 from .reflective_shaders import SOURCE_DEFINES
 from .shaders import MESH_SAMPLERS
-from .structs import IMAGE_DEFINES, INSTANCE, MATERIAL
+from .structs import INSTANCE, MATERIAL
 from .tables import replace_table
 
 if TYPE_CHECKING:
@@ -35,9 +35,9 @@ SURFACE_POINT = Struct(
     area="float",  # m², world
     geometric_normal="vec3",
     texel="int",
-    base_uv="vec2",
-    emission_uv="vec2",
+    backfacing="float",
 )
+ATTRIBUTE_WIDTH = 1024  # texels a row of attribute_tx
 
 SURFACE_POINT_DRAW = Shader(
     name="surface_point_draw",
@@ -45,10 +45,21 @@ SURFACE_POINT_DRAW = Shader(
     fragment="frame/surface_point_draw_frag.glsl",
     varyings={"v_point": "flat INT"},
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_reflectance": "VEC4"},
-    samplers={**MESH_SAMPLERS, "point_tx": "FLOAT_2D"},
+    samplers={**MESH_SAMPLERS, "point_tx": "FLOAT_2D", "attribute_tx": "FLOAT_2D"},
     structs=(INSTANCE, MATERIAL, SURFACE_POINT),
-    constants={"pc_first_point": "INT", "pc_side": "INT", "pc_material": "INT", "pc_emits": "INT"},
-    defines=(*IMAGE_DEFINES, *SOURCE_DEFINES),
+    constants={
+        "pc_first_point": "INT",
+        "pc_side": "INT",
+        "pc_material": "INT",
+        "pc_emits": "INT",
+        "pc_attributes": "INT",  # texels a point has in attribute_tx
+    },
+    defines=(
+        *SOURCE_DEFINES,
+        ("MATERIAL_CAMERA_RAY", "0"),
+        ("MATERIAL_SCATTERED", "1"),
+        ("ATTRIBUTE_WIDTH", str(ATTRIBUTE_WIDTH)),
+    ),
 )
 
 
@@ -64,11 +75,11 @@ class SurfacePoints:
     def __init__(self, device: Device, kind: Literal["AREA", "EMISSION"]) -> None:
         self.device = device
         self.kind = kind
-        self.count = 0
+        self.count = self._attribute_count = 0
         self.total_area = 0.0  # m², of the surfaces that the points are on
         self._sampler = SurfaceSampler()
-        self._image_means: dict[Hashable, np.ndarray] = {}
         self._table: Texture | None = None
+        self._attributes: Texture | None = None
         self._runs: tuple[tuple[int, int, int], ...] = ()  # material, first row of the table, rows
         self._seen: tuple = ()  # what of the scene the last update looked at
         self._sampled: tuple = ()  # what the points depend on, but the instances' shapes
@@ -101,19 +112,21 @@ class SurfacePoints:
             return
         shared = {
             "instance_tx": gpu_scene.instance_table,
-            "material_tx": gpu_scene.material_table,
             "point_tx": self._table,
+            "attribute_tx": self._attributes,
             "pc_side": viewport[2],
             "pc_emits": int(self.kind == "EMISSION"),
+            "pc_attributes": self._attribute_count,
         }
-        with self.device.drawing(SURFACE_POINT_DRAW, target, viewport=viewport, **shared) as draw_call:
-            for material, first, count in self._runs:
-                given = {"pc_first_point": first, "pc_material": material, **gpu_scene.textures_of(material)}
-                draw_call(count=3 * count, **given)
+        for material, first, count in self._runs:
+            program = material_program(SURFACE_POINT_DRAW, gpu_scene.code_of(material))
+            given = shared | gpu_scene.material_inputs(program) | gpu_scene.own_inputs(material)
+            self.device.draw(program, None, target, viewport=viewport, count=3 * count, pc_first_point=first, **given)
 
     def free(self) -> None:
         self.device.free(self._table)
-        self._table = None
+        self.device.free(self._attributes)
+        self._table = self._attributes = None
         self._seen = self._sampled = self._runs = ()
         self.count = 0
 
@@ -121,12 +134,11 @@ class SurfacePoints:
         scene = gpu_scene.scene
         draws = visible_draws(gpu_scene, Visibility.BOUNCE)
         if self.kind == "AREA":  # what takes no indirect light has none to pass on
-            return [_part(draw, 1.0) for draw in draws if Visibility.NO_INDIRECT not in draw.visibility]
-        self._image_means = {key: mean for key, mean in self._image_means.items() if key in scene.images}
-        densities = [emission_density(m, scene, self._image_means) for m in scene.materials]
+            return [_part(draw, gpu_scene, 1.0) for draw in draws if Visibility.NO_INDIRECT not in draw.visibility]
+        densities = [emission_density(material) for material in scene.materials]
         # Against the brightest, in a single's precision: dimming all emitters alike moves no point.
         shares = (np.array(densities) / max(*densities, 1e-30)).astype(np.float32).tolist()
-        return [_part(draw, shares[draw.material]) for draw in draws if shares[draw.material] > 0.0]
+        return [_part(draw, gpu_scene, shares[draw.material]) for draw in draws if shares[draw.material] > 0.0]
 
     def _same_shapes(self, shapes: np.ndarray) -> bool:
         """Compared with the shapes that the points were made for, so that small changes add up."""
@@ -153,12 +165,26 @@ class SurfacePoints:
         used, first, counts = np.unique(points.materials[order], return_index=True, return_counts=True)
         self._runs = tuple(zip(used.tolist(), first.tolist(), counts.tolist(), strict=True))
         self._table = replace_table(self.device, _packed(points, order), self._table)
+        self._attribute_count = points.attributes.shape[1]
+        self.device.free(self._attributes)
+        self._attributes = self.device.texture(*_attribute_rows(points, order))
 
 
-def _part(draw: Draw, density: float) -> Part:
+def _part(draw: Draw, gpu_scene: GpuScene, density: float) -> Part:
     triangles = draw.first_vertex // 3, draw.vertex_count // 3
     instances = draw.first_instance, draw.instance_count
-    return Part(draw.mesh, *triangles, *instances, draw.material, draw.uv_maps, density)
+    code = gpu_scene.code_of(draw.material)
+    asked = () if code is None else tuple((a.field, a.name) for a in code.mesh_fields.values())
+    return Part(draw.mesh, *triangles, *instances, draw.material, asked, density)
+
+
+def _attribute_rows(points: Points, order: np.ndarray) -> tuple[tuple[int, int], str, np.ndarray]:
+    """What the materials ask of meshes at each point as the arguments of Device.texture, in the order of the table."""
+    texels = points.attributes[order].reshape(-1, 4)
+    height = max(-(-len(texels) // ATTRIBUTE_WIDTH), 1)
+    rows = np.zeros((height * ATTRIBUTE_WIDTH, 4), np.float32)
+    rows[: len(texels)] = texels
+    return (ATTRIBUTE_WIDTH, height), "RGBA32F", rows.reshape(height, ATTRIBUTE_WIDTH, 4)
 
 
 def _packed(points: Points, order: np.ndarray) -> np.ndarray:
@@ -171,6 +197,5 @@ def _packed(points: Points, order: np.ndarray) -> np.ndarray:
         area=SIDES * points.weights[order],
         geometric_normal=points.geometric_normals[order],
         texel=order,
-        base_uv=points.base_uvs[order],
-        emission_uv=points.emission_uvs[order],
+        backfacing=points.backfacing[order],
     )

@@ -27,6 +27,12 @@ __all__ = ["VOXEL_GRID", "VOXEL_SAMPLERS", "VoxelGrid", "Voxels", "grid_bounds"]
 
 # Bounded pieces of work: a millisecond of a GPU, a tenth of a second in software.
 PIECE_TRIANGLES = 300_000
+# A voxel blocks all light or none: what lets more pass than this blocks none.
+MOST_PASSING = 0.5
+
+
+def _blocks(draw: Draw, gpu_scene: GpuScene) -> bool:
+    return gpu_scene.scene.materials[draw.material].passing <= MOST_PASSING
 
 
 class Voxels:
@@ -61,7 +67,7 @@ class Voxels:
         pieces = []
         for index in range(len(self.grids)):
             seen = self.grids[0].reached_from_outside if index else None
-            draws = visible_draws(gpu_scene, Visibility.SHADOW, seen)
+            draws = [d for d in visible_draws(gpu_scene, Visibility.SHADOW, seen) if _blocks(d, gpu_scene)]
             pieces += [(index, axis, piece) for piece in _pieces(draws) for axis in range(3)]
         for number, (index, axis, draws) in enumerate(pieces, 1):
             self._draw(gpu_scene, index, axis, draws)

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from .code import Attribute
-from .generator import MaterialShader, generate
+from .generator import VALUE_WIDTH, MaterialShader, generate
 from .node_code import gives, is_supported, supported_kinds
 
-__all__ = ["Attribute", "MaterialShader", "generate", "gives", "is_supported", "supported_kinds"]
+__all__ = [
+    "VALUE_WIDTH",
+    "Attribute",
+    "MaterialShader",
+    "generate",
+    "gives",
+    "is_supported",
+    "supported_kinds",
+]

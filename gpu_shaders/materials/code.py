@@ -39,6 +39,9 @@ class Attribute:
     name: str
 
 
+ACTIVE_UV = Attribute("uv", "")
+
+
 @dataclass(frozen=True)
 class Code:
     """What a node becomes. An output without an expression is not supported."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ...scene.node_graph import (
     COLOR,
@@ -25,10 +26,11 @@ from ...scene.node_graph import (
     Place,
     Slot,
 )
-from .code import POINT_FIELDS, Attribute, Code
+from .code import ACTIVE_UV, POINT_FIELDS, Attribute, Code
 from .node_code import code_of
 
 VALUE_WIDTH = 1024  # texels a row of value_tx
+MOST_KEPT = 1024  # generated shaders: more than any file has
 GLSL_TYPES = {FLOAT: "float", VECTOR: "vec3", COLOR: "vec3", SHADER: "MaterialSurface"}
 DEFINES = (("TABLE_SIZE", str(TABLE_SIZE)),)
 
@@ -52,13 +54,20 @@ class MaterialShader:
     defines: tuple[tuple[str, str], ...]
 
     @property
+    def mesh_fields(self) -> dict[str, Attribute]:
+        """The fields that a mesh gives, and what of it."""
+        numbered = {f"{a.field}_{k}": a for k, a in enumerate(self.attributes)}
+        return {name: numbered.get(name, ACTIVE_UV) for name in self.needs if name == "uv" or name in numbered}
+
+    @property
     def samplers(self) -> dict[str, str]:
         """What ``Shader.samplers`` gets."""
         return {"value_tx": "FLOAT_2D"} | {f"image_{k}_tx": "FLOAT_2D" for k in range(self.image_count)}
 
 
-def generate(graph: NodeGraph, voronoi_float_hash: bool = False) -> MaterialShader:
-    """The shader of a graph. ``voronoi_float_hash``: cells' points as Blender drew them before 5.0."""
+@lru_cache(maxsize=MOST_KEPT)
+def generate(graph: NodeGraph) -> MaterialShader:
+    """The shader of a graph: the same object for equal graphs, while they are many but not too many."""
     writer = _Writer(_used(graph))
     for index, node in enumerate(graph.nodes):
         writer.add(index, node)
@@ -72,7 +81,8 @@ def generate(graph: NodeGraph, voronoi_float_hash: bool = False) -> MaterialShad
         f"MaterialSurface material_surface(MaterialPoint point)\n{{\n{body}\n}}\n"
     )
     images = 1 + max((node.image for node in graph.nodes), default=-1)
-    defines = (*DEFINES, ("VORONOI_FLOAT_HASH", str(int(voronoi_float_hash))))
+    float_hash = any(dict(node.options).get("float_hash") for node in graph.nodes)
+    defines = (*DEFINES, ("VORONOI_FLOAT_HASH", str(int(float_hash))))
     return MaterialShader(text, tuple(needs), tuple(writer.attributes), images, defines)
 
 

@@ -1,4 +1,5 @@
-/* Normal Map and Bump. Their frames are made from screen derivatives, so they need a fragment shader. */
+/* Normal Map and Bump. Their frames are made from screen derivatives, so they need a fragment shader; where a program's
+ * neighbouring fragments are not neighbours on the surface (MATERIAL_SCATTERED) they leave the normal alone. */
 
 /* The axes along which a UV map grows on a surface, unit, in the surface's plane. */
 void relief_frame(vec3 normal, vec3 P, vec2 uv, out vec3 tangent, out vec3 bitangent)
@@ -21,6 +22,9 @@ vec3 relief_toward(vec3 normal, vec3 wanted)
 /* A tangent-space map's colour; `strength` flattens or exaggerates it. */
 vec3 relief_tangent_map(vec3 color, float strength, vec3 normal, vec3 P, vec2 uv)
 {
+#ifdef MATERIAL_SCATTERED
+  return normal;
+#endif
   vec3 tangent, bitangent;
   relief_frame(normal, P, uv, tangent, bitangent);
   vec3 n = 2.0 * color - 1.0;
@@ -38,6 +42,9 @@ vec3 relief_mixed(vec3 mapped, float strength, vec3 normal)
 /* The normal of a surface raised by `height` (Mikkelsen 2010). */
 vec3 relief_bump(float height, float strength, float distance, vec3 normal, vec3 P)
 {
+#ifdef MATERIAL_SCATTERED
+  return normal;
+#endif
   vec3 dx = dFdx(P), dy = dFdy(P);
   vec3 across = cross(dy, normal), along = cross(normal, dx);
   float area = dot(dx, across);

@@ -4,7 +4,7 @@
 struct MaterialSurface {
   vec3 diffuse;      /* diffuse reflectance */
   vec3 specular;     /* reflectance of the lobe at normal incidence; black: there is none */
-  vec3 layer;        /* how much of it lies over the diffuse part and takes from it */
+  vec3 layer;        /* reflectance at normal incidence of what lies over the diffuse and refracting part */
   float roughness;   /* of that lobe, and of what is refracted */
   vec3 emission;     /* radiance, W/(m^2 sr) */
   vec3 transparent;  /* what passes straight on: 1 - alpha */
@@ -32,13 +32,20 @@ float surface_mean(vec3 c)
   return (c.r + c.g + c.b) / 3.0;
 }
 
+/* What a layer can take from. */
+float surface_under(MaterialSurface s)
+{
+  return surface_mean(s.diffuse + s.transmission);
+}
+
 /* Weighted sum; what has one value only is averaged by what each lobe reflects. */
 MaterialSurface surface_sum(MaterialSurface a, float wa, MaterialSurface b, float wb)
 {
   MaterialSurface s;
   s.diffuse = wa * a.diffuse + wb * b.diffuse;
   s.specular = wa * a.specular + wb * b.specular;
-  s.layer = wa * a.layer + wb * b.layer;
+  float da = wa * surface_under(a), db = wb * surface_under(b);
+  s.layer = da + db > 0.0 ? mix(a.layer, b.layer, db / (da + db)) : a.layer;
   s.emission = wa * a.emission + wb * b.emission;
   s.transparent = wa * a.transparent + wb * b.transparent;
   s.transmission = wa * a.transmission + wb * b.transmission;
@@ -130,6 +137,7 @@ MaterialSurface surface_glass(vec3 color, float roughness, float ior, vec3 norma
 {
   MaterialSurface s = surface_refraction(color, roughness, ior, normal);
   s.specular = color * surface_dielectric(ior);
+  s.layer = s.specular;
   return s;
 }
 
@@ -155,7 +163,7 @@ MaterialSurface surface_principled(SurfacePrincipled p, vec3 normal)
   vec3 base = max(p.base, 0.0);
   s.diffuse = base * (alpha * (1.0 - metallic) * (1.0 - transmission));
   s.specular = alpha * mix(layer, base, metallic);
-  s.layer = alpha * (1.0 - metallic) * (1.0 - transmission) * layer;
+  s.layer = layer;
   s.roughness = clamp(p.roughness, 0.0, 1.0);
   s.transmission = base * (alpha * (1.0 - metallic) * transmission);
   s.ior = p.ior;

@@ -34,11 +34,11 @@ def add(tree, kind, **inputs):
 
 def shown(found):
     """The values of the emission's colour, which no node makes."""
-    emission = found.graph.nodes[found.graph.surface.node]
+    emission = found.filled.graph.nodes[found.filled.graph.surface.node]
     assert emission.kind == "ShaderNodeEmission"
     source = emission.inputs[0].source
     assert isinstance(source, Slot)
-    return found.values.ravel()[source.index : source.index + 3]
+    return found.filled.table.ravel()[source.index : source.index + 3]
 
 
 def test_default_material_is_a_principled_surface(clean_scene):
@@ -46,12 +46,12 @@ def test_default_material_is_a_principled_surface(clean_scene):
     if bpy.app.version < (5, 0, 0):
         made.use_nodes = True
     found = read()
-    assert [node.kind for node in found.graph.nodes] == ["ShaderNodeBsdfPrincipled"]
-    given = {entry.name: entry.source for entry in found.graph.nodes[0].inputs}
+    assert [node.kind for node in found.filled.graph.nodes] == ["ShaderNodeBsdfPrincipled"]
+    given = {entry.name: entry.source for entry in found.filled.graph.nodes[0].inputs}
     assert isinstance(given["Base Color"], Slot) and given["Normal"] == Place("normal")
-    np.testing.assert_allclose(found.values.ravel()[given["Base Color"].index :][:3], 0.8, atol=1e-6)
+    np.testing.assert_allclose(found.filled.table.ravel()[given["Base Color"].index :][:3], 0.8, atol=1e-6)
     assert not found.unsupported
-    assert "surface_principled" in generate(found.graph).text
+    assert "surface_principled" in generate(found.filled.graph).text
 
 
 def test_a_number_changes_values_and_not_the_graph(tree):
@@ -60,9 +60,9 @@ def test_a_number_changes_values_and_not_the_graph(tree):
     before = read()
     by_identifier(node.inputs, "Scale").default_value = 5.0
     after = read()
-    assert before.graph == after.graph and not np.array_equal(before.values, after.values)
+    assert before.filled.graph == after.filled.graph and not np.array_equal(before.filled.values, after.filled.values)
     node.noise_dimensions = "2D"
-    assert read().graph != after.graph
+    assert read().filled.graph != after.filled.graph
 
 
 def test_reroutes_and_muted_nodes_are_passed_through(tree):
@@ -111,10 +111,10 @@ def test_a_group_used_twice_is_read_with_both_inputs(tree):
     node.node_tree = outer
     emit(tree, node.outputs[0])
     found = read()
-    assert [n.kind for n in found.graph.nodes] == ["ShaderNodeInvert"] * 2 + ["ShaderNodeEmission"]
-    source = next(entry.source for entry in found.graph.nodes[0].inputs if entry.name == "Color")
-    np.testing.assert_allclose(found.values.ravel()[source.index :][:3], COLOR[:3], atol=1e-6)
-    assert Link(0, "Color") in [entry.source for entry in found.graph.nodes[1].inputs]
+    assert [n.kind for n in found.filled.graph.nodes] == ["ShaderNodeInvert"] * 2 + ["ShaderNodeEmission"]
+    source = next(entry.source for entry in found.filled.graph.nodes[0].inputs if entry.name == "Color")
+    np.testing.assert_allclose(found.filled.table.ravel()[source.index :][:3], COLOR[:3], atol=1e-6)
+    assert Link(0, "Color") in [entry.source for entry in found.filled.graph.nodes[1].inputs]
 
 
 def test_a_groups_number_makes_a_colour_grey(tree):
@@ -128,7 +128,7 @@ def test_a_groups_number_makes_a_colour_grey(tree):
     outer.node_tree = group
     tree.links.new(by_identifier(noise.outputs, "Color"), outer.inputs[0])
     emit(tree, outer.outputs[0])
-    assert "float n1_value = color_gray(n0_color);" in generate(read().graph).text
+    assert "float n1_value = color_gray(n0_color);" in generate(read().filled.graph).text
 
 
 def test_unsupported_nodes_are_named_and_replaced(tree):
@@ -144,9 +144,9 @@ def test_unsupported_nodes_are_named_and_replaced(tree):
         "node 'Hair' is not supported, the socket's own value is shown",
         "node 'Occlusion' is not supported, its input 'Color' is passed on",
     )
-    mixed = next(n for n in found.graph.nodes if n.kind == "ShaderNodeMixRGB")
+    mixed = next(n for n in found.filled.graph.nodes if n.kind == "ShaderNodeMixRGB")
     given = {entry.name: entry.source for entry in mixed.inputs}
-    assert isinstance(given["Color1"], Link) and found.values.ravel()[given["Fac"].index] == pytest.approx(0.3)
+    assert isinstance(given["Color1"], Link) and found.filled.table.ravel()[given["Fac"].index] == pytest.approx(0.3)
 
 
 def test_an_output_that_is_not_supported_is_named(tree):
@@ -156,7 +156,7 @@ def test_an_output_that_is_not_supported_is_named(tree):
     emit(tree, mix.outputs[0])
     found = read()
     assert found.unsupported == ("node 'Geometry' does not give 'Pointiness', the socket's own value is shown",)
-    assert "point.position" in generate(found.graph).text
+    assert "point.position" in generate(found.filled.graph).text
 
 
 def test_an_unsupported_shader_is_diffuse_of_its_colour(tree):
@@ -164,7 +164,7 @@ def test_an_unsupported_shader_is_diffuse_of_its_colour(tree):
     toon.name = "Toon"
     tree.links.new(toon.outputs[0], output.inputs["Surface"])
     found = read()
-    assert [n.kind for n in found.graph.nodes] == ["ShaderNodeBsdfDiffuse"]
+    assert [n.kind for n in found.filled.graph.nodes] == ["ShaderNodeBsdfDiffuse"]
     assert found.unsupported == ("node 'Toon' is not supported, it is shown as diffuse",)
 
 
@@ -173,7 +173,7 @@ def test_a_circle_of_links_ends(tree):
     tree.links.new(first.outputs[0], by_identifier(second.inputs, "Color"))
     tree.links.new(second.outputs[0], by_identifier(first.inputs, "Color"))
     emit(tree, second.outputs[0])
-    assert "surface_emission" in generate(read().graph).text
+    assert "surface_emission" in generate(read().filled.graph).text
 
 
 def test_a_very_deep_tree_is_read(tree):
@@ -184,21 +184,21 @@ def test_a_very_deep_tree_is_read(tree):
         socket = node.outputs[0]
     emit(tree, socket)
     found = read()
-    assert len(found.graph.nodes) == 502 and not found.unsupported
+    assert len(found.filled.graph.nodes) == 502 and not found.unsupported
 
 
 @pytest.mark.parametrize("kind", ["ShaderNodeRGB", "ShaderNodeTexNoise"])
 def test_a_colour_as_a_surface_is_emitted(tree, kind):
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(tree.nodes.new(kind).outputs["Color"], output.inputs["Surface"])
-    assert "return surface_emission(n0_color, 1.0, point.normal);" in generate(read().graph).text
+    assert "return surface_emission(n0_color, 1.0, point.normal);" in generate(read().filled.graph).text
 
 
 def test_nothing_linked_to_the_output_is_black(tree):
     tree.nodes.new("ShaderNodeOutputMaterial")
-    assert read().graph.surface is None
+    assert read().filled.graph.surface is None
     tree.nodes.clear()
-    assert read().graph.surface is None
+    assert read().filled.graph.surface is None
 
 
 @pytest.mark.parametrize("file", ["sample_materials", "templates"])
@@ -207,11 +207,11 @@ def test_real_materials_are_read_and_generated(clean_scene, shared_dir, tmp_path
     with bpy.data.libraries.load(str(shared_dir / "scenes/nodes" / f"{file}.blend")) as (there, here):
         here.materials = there.materials
     found = [read_graph(material, lambda image, user: image.name) for material in bpy.data.materials]
-    assert sum(one.graph.surface is not None for one in found) > len(found) / 2
+    assert sum(one.filled.graph.surface is not None for one in found) > len(found) / 2
     files = []
-    for one in {one.graph: one for one in found}.values():
+    for one in {one.filled.graph: one for one in found}.values():
         files.append(tmp_path / f"{len(files)}.frag")
-        files[-1].write_text(material_program(generate(one.graph)).standalone_sources()["frag"])
+        files[-1].write_text(material_program(generate(one.filled.graph)).standalone_sources()["frag"])
     assert files
     if shutil.which("glslangValidator"):
         answer = subprocess.run(["glslangValidator", *files], capture_output=True, text=True, check=False)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rebound.scene.data import Image, Instance, Material, Mesh, Texture
+from rebound.scene.data import Image, Instance, Material, Mesh
 from rebound.settings import Settings
+from rebound.tests.support.graphs import image_material
 from rebound.tests.support.render_scenes import (
     EVERYTHING,
     QUICK,
@@ -87,10 +88,10 @@ def textured(closest, repeat, uv_map=""):
     pixels = np.random.default_rng(4).random((4, 4, 4)).astype(np.float32)
     corners = FLOOR.positions[:, :2] / 4 + 0.5  # the image once over the floor
     mesh = replace(FLOOR, uvs={"first": corners, "second": corners[:, ::-1]}, active_uv="first")
-    texture = Texture("image", uv_map, repeat, closest)
-    material = Material("Picture", base_color_texture=texture, emission=(2.0, 2.0, 2.0), emission_texture=texture)
+    image = Image("image", "Image", pixels)
+    material = image_material("Picture", image, 2.0, uv_map=uv_map, repeat=repeat, closest=closest)
     shown = scene([mesh], [], materials=[material], filter_width=1e-3)
-    return replace(shown, images={"image": Image("image", "Image", pixels)}), pixels[..., :3].astype(np.float64)
+    return replace(shown, images={"image": image}), pixels[..., :3].astype(np.float64)
 
 
 def test_texture_lies_where_its_uv_map_says(studio):

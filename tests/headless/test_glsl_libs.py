@@ -122,8 +122,8 @@ def test_image_is_wrapped_and_filtered(call, headless_device, mode, size):
         place_in_texel = (uv * np.array(size)) % 1
         uv = uv[(np.abs(place_in_texel - 0.5) < 0.49).all(1)]  # no texel's edge, which may round either way
     found = call(
-        ["lib/image_lib.glsl"],
-        f"image_sample(image_tx, at.xy, {mode})",
+        ["materials/texture_lib.glsl"],
+        f"texture_sample(image_tx, at.xy, {mode & 1}, {mode >> 1}, 0)",
         {"at": uv},
         textures=["image_tx"],
         image_tx=texture,

@@ -8,7 +8,8 @@ import pytest
 
 from rebound.gpu_shaders.frame.reflective_shaders import SourceKind
 from rebound.gpu_shaders.frame.surface_points import SIDES, SurfacePoints
-from rebound.scene.data import Image, Material, Mesh, Texture, Visibility
+from rebound.scene.data import Image, Material, Mesh, Visibility
+from rebound.tests.support.graphs import image_material
 from rebound.tests.support.render_scenes import Studio, aimed, box, place, quad, scene, sphere, triangles
 
 SIDE = 32
@@ -165,15 +166,11 @@ def textured(emits):
     """A quad whose left half has a red and whose right half a blue texel, and a brown second image nobody uses."""
     pixels = np.ones((1, 2, 4), np.float32)
     pixels[0, :, :3] = (1, 0, 0), (0, 0, 0.5)
-    image = Texture("image", closest=True)
+    image = Image("image", "image", pixels)
     uvs = {"uv": (LAMP.positions[:, :2] / (1.0, 0.5) + 0.5).astype(np.float32)}
     mesh = Mesh("textured", LAMP.positions, LAMP.normals, uvs, "uv", ((0, 0, 2),), LAMP.bounds)
-    lamp = Material("shown", emission=(4.0, 4.0, 4.0), emission_texture=image)
-    paint = Material("painted", base_color_texture=image)
-    return replace(
-        scene([replace(mesh, key=("textured", 0))], materials=[lamp if emits else paint]),
-        images={"image": Image("image", "image", pixels)},
-    )
+    material = image_material("shown", image, 4.0 if emits else 0.0, closest=True)
+    return replace(scene([replace(mesh, key=("textured", 0))], materials=[material]), images={"image": image})
 
 
 def test_texture_colours_what_is_emitted(emission):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rebound.device import Shader
-from rebound.gpu_shaders.frame.structs import IMAGE_DEFINES, LIGHT_DEFINES, MAP_DEFINES
+from rebound.gpu_shaders.frame.structs import LIGHT_DEFINES, MAP_DEFINES
 
 WIDTH = 64
 
@@ -53,7 +53,7 @@ def evaluate(
         samplers=dict.fromkeys(sent, "FLOAT_2D"),
         structs=tuple(tables),
         constants=dict.fromkeys(given, "FLOAT"),
-        defines=(*LIGHT_DEFINES, *MAP_DEFINES, *IMAGE_DEFINES),
+        defines=(*LIGHT_DEFINES, *MAP_DEFINES),
     )
     result = device.texture((WIDTH, height), "RGBA32F")
     device.fullscreen(shader, device.target([result]), **sent, **given)

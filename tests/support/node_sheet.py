@@ -198,7 +198,7 @@ def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
     """What the generated GLSL emits where the attributes are a and b, (h, w, 3) each: (h, w, 3) float32."""
     read = read_graph(material, lambda image, user: image.name)
     assert not read.unsupported, read.unsupported
-    shader = generate(read.graph, voronoi_float_hash=bpy.app.version < (5, 0, 0))
+    shader = generate(read.filled.graph)
     given = {f"color_{k}": f"{n.name}_tx" for k, n in enumerate(shader.attributes) if n.field == "color"}
     normal = "normalize(vec3({}, {}, {}))".format(*tilt)
     point = (
@@ -231,8 +231,10 @@ def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
         defines=shader.defines,
     )
     result = device.texture((CELL, CELL), "RGBA32F")
-    sent["value_tx"] = value_texture(device, read.values)
-    sent |= {f"image_{k}_tx": image_texture(device, bpy.data.images[str(name)]) for k, name in enumerate(read.images)}
+    sent["value_tx"] = value_texture(device, read.filled.table)
+    sent |= {
+        f"image_{k}_tx": image_texture(device, bpy.data.images[str(name)]) for k, name in enumerate(read.filled.images)
+    }
     device.fullscreen(program, device.target([result]), pc_values=0, **sent)
     return device.read(result)[..., :3]
 

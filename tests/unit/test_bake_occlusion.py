@@ -134,7 +134,7 @@ def test_texture_is_averaged_over_each_triangle():
     corners = quad("floor")
     left = np.array([[0, 0], [0.4, 0], [0.4, 1], [0.6, 0], [0.9, 1], [0.6, 1]], np.float32)
     mesh = Mesh("m", corners.positions, corners.normals, {"UV": left}, "UV", corners.slots, corners.bounds)
-    material = Material("Cloth", (1, 1, 1), Texture("i"))
+    material = Material("Cloth", (1, 1, 1), base_color_texture=Texture("i"))
     scene = Scene(
         {"m": mesh}, (Instance("o", "m", (0,), np.eye(4), EVERYTHING),), (material,), {"i": Image("i", "i", pixels)}
     )

@@ -92,7 +92,7 @@ def test_any_scene_comes_back_bit_by_bit(tmp_path, scene, matrix):
 
 
 def test_every_class_of_the_scene_data_has_a_place():
-    """A class that is added to scene.data is found by itself, one from elsewhere is refused at saving."""
+    """A class that is added to scene.data or node_graph is found by itself, one from elsewhere is refused at saving."""
     assert {
         "Scene",
         "View",

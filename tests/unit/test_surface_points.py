@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from rebound.scene.data import Image, Material, Mesh, Scene, Texture
+from rebound.scene.data import Material, Mesh
 from rebound.scene.surface_points import Part, SurfaceSampler, emission_density
 from rebound.tests.support.render_scenes import box, place, quad, sphere, triangles
 
@@ -29,9 +29,7 @@ def parts_of(meshes, counts=None, densities=None, materials=None):
     for i, mesh in enumerate(meshes):
         count = counts[i] if counts else 1
         density = densities[i] if densities else 1.0
-        parts.append(
-            Part(mesh, 0, mesh.triangle_count, first, count, materials[i] if materials else i, ("", ""), density)
-        )
+        parts.append(Part(mesh, 0, mesh.triangle_count, first, count, materials[i] if materials else i, (), density))
         first += count
     return parts
 
@@ -157,19 +155,19 @@ def test_points_are_interpolated_from_their_triangle():
     uvs = {"a": mesh.positions[:, :2] * 0.5 + 3, "b": mesh.positions[:, 1::-1]}
     tilted = mesh.positions + np.float32(4)
     mesh = Mesh(mesh.key, mesh.positions, tilted, uvs, "a", ((0, 0, 2),), mesh.bounds)
-    points = SurfaceSampler().sample([Part(mesh, 0, 2, 0, 1, 0, ("a", "b"))], np.eye(4)[None], 256)
+    points = SurfaceSampler().sample([Part(mesh, 0, 2, 0, 1, 0, (("uv", ""), ("uv", "b")))], np.eye(4)[None], 256)
     side = points.geometric_normals[:, 2]
     np.testing.assert_allclose(np.abs(side), 1)
     assert set(side) == {-1.0, 1.0}
-    np.testing.assert_allclose(points.base_uvs, points.positions[:, :2] * 0.5 + 3, atol=1e-5)
-    np.testing.assert_allclose(points.emission_uvs, points.positions[:, 1::-1], atol=1e-5)
+    np.testing.assert_allclose(points.attributes[:, 0, :2], points.positions[:, :2] * 0.5 + 3, atol=1e-5)
+    np.testing.assert_allclose(points.attributes[:, 1, :2], points.positions[:, 1::-1], atol=1e-5)
     np.testing.assert_allclose(points.normals, (points.positions + 4) * side[:, None], atol=1e-5)
     assert (np.abs(points.positions) <= [2, 1, 0]).all()
 
 
 def test_only_a_parts_own_triangles_are_used():
     mesh = triangles("two", np.concatenate([quad("a").positions, quad("b", (0, 0, 5)).positions]))
-    parts = [Part(mesh, 2, 2, 0, 1, 7, ("", ""))]
+    parts = [Part(mesh, 2, 2, 0, 1, 7)]
     points = SurfaceSampler().sample(parts, np.eye(4)[None], 64)
     np.testing.assert_allclose(points.positions[:, 2], 5)
     assert (points.materials == 7).all()
@@ -216,19 +214,11 @@ def test_instance_that_is_not_finite_or_has_no_size_gets_no_points():
     assert (points.instances == 2).all()
 
 
-def test_emission_is_luminance_times_the_images_mean():
-    pixels = np.zeros((2, 2, 4), np.float32)
-    pixels[0, :, :3] = (1, 0.5, 0)
-    image = Image("image", "image", pixels)
-    picture = Scene(images={"image": image})
-    means = {}
-    lit = Material("lit", emission=(1.0, 2.0, 3.0))
-    assert emission_density(lit, picture, means) == pytest.approx(0.2126 + 2 * 0.7152 + 3 * 0.0722)
-    shown = Material("shown", emission=(2.0, 2.0, 2.0), emission_texture=Texture("image"))
-    assert emission_density(shown, picture, means) == pytest.approx(0.2126 + 0.5 * 0.7152)
-    missing = Material("missing", emission=(1.0, 1.0, 1.0), emission_texture=Texture("lost"))
-    assert emission_density(missing, picture, means) == pytest.approx(1)
-    assert emission_density(Material("dark"), picture, means) == 0
+def test_emission_density_is_luminance():
+    assert emission_density(Material("lit", emission=(1.0, 2.0, 3.0))) == pytest.approx(
+        0.2126 + 2 * 0.7152 + 3 * 0.0722
+    )
+    assert emission_density(Material("dark")) == 0
 
 
 def test_million_triangles_are_sorted_once_and_then_quick():

@@ -1,0 +1,111 @@
+"""Passes that ask surfaces for their material: a program for what is the same all over, and one for each node graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+
+from ...device.shader import Shader
+from ..materials import MaterialShader
+from .structs import MATERIAL_VIEW
+
+# What a material can be asked with, in the terms of a MaterialPlace `place`, of its Instance and of the view.
+FIELDS = {
+    "position": "place.position",
+    "normal": "place.normal",
+    "geometric_normal": "place.geometric",
+    "tangent": "material_tangent(place.normal)",
+    "incoming": "place.toward",
+    "backfacing": "place.backfacing",
+    "generated": "(place.object_position - instance.texture_origin) * instance.texture_scale",
+    "object_position": "place.object_position",
+    "object_normal": "normalize(place.normal * mat3(instance.world_from_object))",
+    "camera_position": "(material_view.camera_from_world * vec4(place.position, 1.0)).xyz",
+    "world_from_object": "instance.world_from_object",
+    "camera_from_world": "material_view.camera_from_world",
+    "window": "material_window(material_view.window_from_world * vec4(place.position, 1.0))",
+    "camera_ray": "float(MATERIAL_CAMERA_RAY)",
+    "object_location": "instance.world_from_object[3].xyz",
+    "object_color": "instance.color",
+    "object_index": "instance.index",
+    "object_random": "instance.random",
+    "material_index": "material_fetch(material_tx, pc_material).index",
+}
+SIZES = {"uv": ("VEC2", "vec2"), "color": ("VEC4", "vec4")}
+_POINT_ATTRIBUTE = """vec4 point_attribute(int number)
+{
+  int at = v_point * pc_attributes + number;
+  return texelFetch(attribute_tx, ivec2(at % ATTRIBUTE_WIDTH, at / ATTRIBUTE_WIDTH), 0);
+}
+
+"""
+_PLACES = """vec3 material_tangent(vec3 normal)
+{
+  vec3 around = vec3(-normal.y, normal.x, 0.0);
+  return dot(around, around) > 0.0 ? normalize(around) : vec3(1.0, 0.0, 0.0);
+}
+
+vec3 material_window(vec4 clip)
+{
+  return vec3(0.5 + 0.5 * clip.xy / clip.w, 0.0);
+}
+"""
+
+
+@lru_cache(maxsize=4096)
+def material_program(plain: Shader, code: MaterialShader | None, passes: bool = False) -> Shader:
+    """The variant of a pass for a graph. ``plain``: its declaration for constants; ``passes``: some light goes through.
+
+    Where it draws meshes its attributes are inputs `in_uv`, `in_uv_0`, `in_color_1`, …; a pass without vertex inputs
+    gets them from attribute_tx, in the order of ``MaterialShader.mesh_fields`` for each point.
+    """
+    passing = (("MATERIAL_PASSES", "1"),) if passes else ()
+    if code is None:
+        return plain if not passes else replace(plain, defines=(*plain.defines, *passing))
+    meshes = bool(plain.inputs)
+    asks_view = any(FIELDS.get(need, "").find("material_view") >= 0 for need in code.needs)
+    # Of fields that need the instance, those of a point are always there.
+    asks_object = meshes and any(word in FIELDS.get(n, "") for n in code.needs for word in ("instance", "object_pos"))
+    files = {"frame/material_lib.glsl": _evaluate(code, meshes)}
+    varyings = dict(plain.varyings)
+    inputs = dict(plain.inputs)
+    if meshes:
+        files["frame/material_corner_lib.glsl"] = _corner(code)
+        varyings |= {f"v_{name}": SIZES[a.field][0] for name, a in code.mesh_fields.items()}
+        inputs |= {f"in_{name}": SIZES[a.field][0] for name, a in code.mesh_fields.items()}
+        varyings |= {"v_object_position": "VEC3", "v_instance": "flat INT"} if asks_object else {}
+    return replace(
+        plain,
+        inputs=inputs,
+        varyings=varyings,
+        samplers={**plain.samplers, **code.samplers},
+        uniforms={**plain.uniforms, **({"material_view": MATERIAL_VIEW} if asks_view else {})},
+        constants={**plain.constants, "pc_values": "INT"},
+        defines=(*plain.defines, *code.defines, *passing, *((("MATERIAL_OBJECT", "1"),) if asks_object else ())),
+        files={**plain.files, **files},
+    )
+
+
+def _evaluate(code: MaterialShader, meshes: bool) -> str:
+    """The file in the place of frame/material_lib.glsl."""
+    attributes: Mapping[str, str] = {
+        name: f"v_{name}" if meshes else f"{SIZES[a.field][1]}(point_attribute({number}))"
+        for number, (name, a) in enumerate(code.mesh_fields.items())
+    }
+    given = {need: attributes.get(need) or FIELDS[need] for need in code.needs}
+    attribute_line = "" if meshes else _POINT_ATTRIBUTE
+    object_line = "  Instance instance = instance_fetch(instance_tx, place.instance);\n"
+    fields = "".join(f"  point.{need} = {expression};\n" for need, expression in given.items())
+    return (
+        f'#include "frame/surface_lib.glsl"\n{attribute_line}{code.text}\n'
+        f'#include "frame/material_graph_lib.glsl"\n{_PLACES}\n'
+        "Surface material_evaluate(inout MaterialPlace place)\n{\n"
+        f"{object_line if 'instance.' in fields else ''}  MaterialPoint point;\n{fields}"
+        "  return material_surface_of(material_surface(point), place);\n}\n"
+    )
+
+
+def _corner(code: MaterialShader) -> str:
+    lines = "".join(f"  v_{name} = in_{name};\n" for name in code.mesh_fields)
+    return f"void material_corner()\n{{\n{lines}}}\n"

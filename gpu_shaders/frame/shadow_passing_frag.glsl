@@ -1,0 +1,16 @@
+/* Shadows of what lets light pass: of each texel's light as much is stopped, all or nothing, as of the whole. */
+#include "frame/material_dither_lib.glsl"
+#include "frame/material_mesh_lib.glsl"
+#include "frame/shadow_slope_lib.glsl"
+#include "lib/math_lib.glsl"
+
+void main()
+{
+  vec3 toward = math_toward(v_position, pc_eye);
+  MaterialPlace place = material_place(toward);
+  Surface surface = material_evaluate(place);
+  shadow_write();
+  if (material_is_passed(surface_toward(surface, dot(place.normal, toward)).coverage)) {
+    discard;
+  }
+}
