@@ -50,6 +50,12 @@ class ImageReader:
             self._done[visit] = self._read(original, path)
         return self._done[visit]
 
+    def keep(self, key: Hashable, make: Callable[[], Image]) -> Hashable:
+        """Have an image that no data-block holds: the previous scene's, or a new one."""
+        if key not in self.images:
+            self.images[key] = self._previous.get(key) or make()
+        return key
+
     def _read(self, image, path: str) -> Hashable | None:
         key = image_key(image, path)
         found = self._previous.get(key) or self._read_pixels(image, key, path)

@@ -7,7 +7,7 @@ here by the nearest value that it can, and named.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 
 import bpy
 
@@ -31,6 +31,8 @@ from .node_tables import curve_rows
 from .nodes import MAX_STEPS, Socket, active_output, find_input, node_tree, step_back
 
 ReadImage = Callable[[object, object], Hashable | None]  # an image and its user -> its key, None where it is missing
+# A Sky Texture node -> the key of its picture, and its sun: a number or a colour by name.
+ReadSky = Callable[[object], tuple[Hashable, Mapping[str, tuple[float, ...]]]]
 
 MAX_DEPTH = 50  # calls within one another: nodes are read inputs first, so only circles of links go deeper than a few
 MAX_IMAGES = 16  # of one material: what is left of a shader's 32 samplers for its other inputs and those of the frame
@@ -47,12 +49,12 @@ CONSTANTS = {"ShaderNodeRGB", "ShaderNodeValue"}
 DIFFUSE_OF = ("Base Color", "Color")
 
 
-def read_graph(material, read_image: ReadImage) -> ReadGraph:
-    """The graph of a bpy material's surface. Black where nothing is linked to its output, as in Cycles.
+def read_graph(material, read_image: ReadImage, read_sky: ReadSky | None = None) -> ReadGraph:
+    """The graph of a bpy material's or world's surface. Black where nothing is linked to its output, as in Cycles.
 
-    A material without nodes is a Diffuse BSDF of its viewport colour.
+    A material without nodes is a Diffuse BSDF of its viewport colour. A Sky Texture is read where ``read_sky`` does.
     """
-    reader = _Reader(read_image)
+    reader = _Reader(read_image, read_sky)
     tree, socket = node_tree(material), None
     if tree is None:
         surface = reader.diffuse(tuple(material.diffuse_color[:3]))
@@ -73,13 +75,14 @@ def read_graph(material, read_image: ReadImage) -> ReadGraph:
 
 
 class _Reader:
-    def __init__(self, read_image: ReadImage):
+    def __init__(self, read_image: ReadImage, read_sky: ReadSky | None):
         self.nodes: list[Node] = []
         self.values = Values()
         self.images: dict[Hashable, None] = {}
         self.unsupported: dict[str, None] = {}
         self._normal: Link | Place = Place("normal")  # what normals are that nothing is linked to
         self._read_image = read_image
+        self._read_sky = read_sky
         self._links: dict[tuple, int | None] = {}  # None: being read
         self._depth = 0
 
@@ -200,6 +203,8 @@ class _Reader:
 
     def _node(self, found: Socket) -> int | None:
         node = found.node
+        if node.bl_idname == "ShaderNodeTexSky" and self._read_sky is not None:
+            return self._sky(found, self._read_sky)
         if not is_supported(node.bl_idname):
             return None
         if node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"}:
@@ -256,6 +261,17 @@ class _Reader:
         data = node.image.colorspace_settings.is_data
         options.append(("alpha", "DATA" if data else "STRAIGHT" if straight else "TIMES"))
         return self._append(found, extra, options, image=list(self.images).index(key))
+
+    def _sky(self, found: Socket, read_sky: ReadSky) -> int:
+        key, sun = read_sky(found.node)
+        self.images.setdefault(key)
+        vector = found.input("Vector")
+        inputs = [self.source(vector, VECTOR) if vector else Input("Vector", VECTOR, Place("generated"))]
+        for name, given in sun.items():
+            type = FLOAT if len(given) == 1 else COLOR
+            inputs.append(Input(name, type, self.values.add(type, given)))
+        self.nodes.append(Node("Sky", tuple(inputs), (("Color", COLOR),), image=list(self.images).index(key)))
+        return len(self.nodes) - 1
 
     def constant(self, slot: Slot) -> Link:
         """A link to a constant, for what takes links only."""

@@ -9,6 +9,7 @@ from .images import ImageReader
 from .node_graph import Link, ReadGraph
 from .node_reader import read_graph
 from .nodes import RGB, Socket, active_output, constant, find_input, mean, node_tree, source
+from .sky_reader import SkyReader
 
 # Outputs of a Texture Coordinate node that know the picture, which light does not.
 OF_THE_PICTURE = {"Window": "the picture's middle", "Camera": "a camera that looks down"}
@@ -28,8 +29,9 @@ def read_world(world, images: ImageReader, warn: Callable[[str], None]) -> World
     color = _one_color(surface)
     if color is not None:
         return World(color, **_settings(world))
-    read = read_graph(world, images.read)
-    problems = [*read.unsupported, *_of_the_picture(read)]
+    skies = SkyReader(images)
+    read = read_graph(world, images.read, skies.read)
+    problems = [*read.unsupported, *skies.problems, *_of_the_picture(read)]
     if problems:
         warn(f"World '{world.name}': {'; '.join(problems)}")
     if read.filled.graph.surface is None:

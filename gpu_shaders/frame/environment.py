@@ -21,8 +21,8 @@ from .environment_shaders import WORLD_VIEW, background_shader, map_shader
 if TYPE_CHECKING:
     from .inputs import FrameInputs
 
-# Texels along a side of the map: of one colour, without an image, and the most.
-PLAIN_SIDE, GRAPH_SIDE, MOST_SIDE = 16, 256, 1024
+# Texels along a side of the map: of one colour, without an image, with a Sky Texture, and the most.
+PLAIN_SIDE, GRAPH_SIDE, SKY_SIDE, MOST_SIDE = 16, 256, 512, 1024
 # Directions along a side of a texel: without an image, and the most; with one, as many as miss none of its texels.
 GRAPH_STEPS, MOST_STEPS = 3, 8
 
@@ -111,7 +111,7 @@ class Environment:
         if world.graph is None:
             return np.broadcast_to(np.array(world.color, np.float32), (PLAIN_SIDE, PLAIN_SIDE, 3)).copy()
         self._upload_values()
-        side, steps = _resolution(self._images)
+        side, steps = _resolution(self._images, any(node.kind == "Sky" for node in world.graph.nodes))
         texture = self.device.texture((side, side), "RGBA32F")
         target = self.device.target([texture])
         self.device.fullscreen(
@@ -142,13 +142,14 @@ def _light_of(world: World) -> tuple:
     return world.color, world.graph, world.values, world.images, *suns
 
 
-def _resolution(images: tuple[Texture, ...]) -> tuple[int, int]:
+def _resolution(images: tuple[Texture, ...], has_sky: bool) -> tuple[int, int]:
     """Texels along a side of the map, and directions along a side of a texel, for a world of these images."""
     if not images:
         return GRAPH_SIDE, GRAPH_STEPS
     # A panorama's texel is pi / height wide, the map's widest 4.6 / side.
     height = max(texture.size[1] for texture in images)
-    side = int(np.clip(1 << (height - 1).bit_length(), GRAPH_SIDE, MOST_SIDE))
+    least = SKY_SIDE if has_sky else GRAPH_SIDE
+    side = int(np.clip(1 << (height - 1).bit_length(), least, MOST_SIDE))
     return side, int(np.clip(np.ceil(1.5 * height * 4.6 / (np.pi * side)), GRAPH_STEPS, MOST_STEPS))
 
 

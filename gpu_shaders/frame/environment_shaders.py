@@ -31,6 +31,7 @@ _FIELDS = {
     "world_from_object": "mat4(1.0)",
     "window": "window",
     "camera_ray": "camera_ray",
+    "footprint": "footprint",
 }
 _LIBRARY = "frame/environment_graph_lib.glsl"
 
@@ -45,7 +46,7 @@ def _library(shader: MaterialShader) -> str:
     fields = "".join(f"  point.{name} = {_FIELDS.get(name) or zero(name)};\n" for name in shader.needs)
     return (
         f"{shader.text}\n"
-        "vec3 graph_radiance(vec3 D, float camera_ray, vec3 window, mat4 camera_from_world)\n{\n"
+        "vec3 graph_radiance(vec3 D, float camera_ray, float footprint, vec3 window, mat4 camera_from_world)\n{\n"
         f"  MaterialPoint point;\n{fields}"
         "  return clamp(material_surface(point).emission, vec3(0.0), vec3(1e30));\n}\n"
     )

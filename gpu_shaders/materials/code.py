@@ -26,6 +26,7 @@ POINT_FIELDS = {
     "object_index": "float",
     "object_random": "float",
     "material_index": "float",
+    "footprint": "float",  # angle that a sample of a world stands for, radians; 0: exactly one direction
     "uv": "vec2",
     "color": "vec4",
 }

@@ -239,6 +239,7 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
     "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute,
     # The reader's own.
+    "Sky": texture_code.SKY,
     "Number": Code({"Value": "{Value}"}),
     "Plain": Code({"Color": "{Color}", "Alpha": "{Alpha}"}),
 }

@@ -127,3 +127,13 @@ def environment(node: Node) -> Code:
     return Code(
         {"Color": f"texture_sample({{image}}, texture_{place}({{Vector}}), {filtering}, 0, 0).rgb"}, ("texture",)
     )
+
+
+# The reader's own, of a Sky Texture: its picture, and its sun's disc.
+SKY = Code(
+    {
+        "Color": "sky_radiance({image}, SkySun({Turn}, {Elevation}, {Radius}, {Earth}, {Bottom}, {Top}), {Vector}, "
+        "point.footprint)"
+    },
+    ("texture", "sky"),
+)
