@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from .cameras import FARTHEST, camera_warnings
 from .data import Array, Instance, Light, Mesh, Scene, Visibility
+from .hair import HairReader, has_strands
 from .images import ImageReader, OnMainThread
 from .lights import read_light
 from .materials import MaterialTable
@@ -18,11 +19,8 @@ from .transfers import TransferReader
 from .world import read_world
 
 # Not among them: grease pencil, which Blender itself draws over any engine's picture.
-UNSHOWN_TYPES = {
-    "CURVES": "hair curves",
-    "POINTCLOUD": "point clouds",
-    "VOLUME": "volumes",
-}
+UNSHOWN_TYPES = {"VOLUME": "volumes"}
+SHOWN_TYPES = {"MESH", "LIGHT", "CURVES", "POINTCLOUD"}
 MOST_RANDOM_ID = 0xFFFFFFFF
 
 
@@ -96,8 +94,8 @@ def instance_matrices(depsgraph, count: int) -> Array:
 class SceneReader:
     """Collects one scene while the depsgraph's instances go by; nothing of Blender's is kept past one of them.
 
-    ``rows`` tells of each item of depsgraph.object_instances what became of it: the number of its Instance, or ~number
-    of its Light, None where nothing did.
+    ``rows`` tells of each item of depsgraph.object_instances what became of it: numbers of its Instances (itself, its
+    hair), ~number of its Light, or nothing.
     """
 
     def __init__(
@@ -117,15 +115,16 @@ class SceneReader:
         self.warnings: dict[str, None] = {}  # an ordered set: each line once
         self.images = ImageReader(previous.images, self.warn, on_main_thread)
         self.materials = MaterialTable(self.images, self.warn)
+        self.hair = HairReader(previous.meshes)
         self.transfers = TransferReader(previous, self.warn)
         self.read: dict[Hashable, Mesh] = {}  # some have no triangles
         self.known = known or {}  # what meshes were when they were read last, by mesh_key
-        self.states: dict[Hashable, Mesh] = {}  # the same for the next time
+        self.states: dict[tuple, Mesh] = {}  # the same for the next time
         self.read_by_uid: dict[tuple, Mesh] = {}  # those of evaluated data-blocks, which many instances share
         self.instances: list[Instance] = []
         self.lights: list[Light] = []
         self.keys: set[Hashable] = set()
-        self.rows: list[int | None] = []
+        self.rows: list[tuple[int, ...]] = []
         self.instancers: set[int] = set()  # session uids of the original objects that place others
         self.is_whole = True  # False if something was left out because of its transform
         self.before = {instance.key: instance for instance in previous.instances}
@@ -141,8 +140,8 @@ class SceneReader:
         matrices = instance_matrices(self.depsgraph, len(self.depsgraph.object_instances)).astype(np.float64)
         fine = np.abs(matrices).max((1, 2), initial=0.0) < FARTHEST  # false for NaN
         for row, instance in enumerate(self.depsgraph.object_instances):
-            self.rows.append(None)
-            if instance.show_self:
+            self.rows.append(())
+            if instance.show_self or instance.show_particles:
                 self.add(instance, row, matrices[row], bool(fine[row]))
 
     def add(self, instance, row: int, matrix: Array, is_finite: bool) -> None:
@@ -150,9 +149,9 @@ class SceneReader:
         obj = instance.object
         kind = obj.type
         # A curve, text, surface or metaball comes a second time, as an instance of its evaluated mesh.
-        if kind not in {"MESH", "LIGHT"}:
+        if kind not in SHOWN_TYPES:
             if kind in UNSHOWN_TYPES:
-                self.warn(f"Object '{obj.name}': {UNSHOWN_TYPES[kind]} are not shown yet")
+                self.warn(f"Object '{obj.name}': {UNSHOWN_TYPES[kind]} are not supported; it is left out")
             return
         parent = instance.parent if instance.is_instance else obj
         if self.visible is not None and not self.visible(parent.original):
@@ -167,13 +166,21 @@ class SceneReader:
             if light is None:
                 self.is_whole = False
             else:
-                self.rows[row] = ~len(self.lights)
+                self.rows[row] = (~len(self.lights),)
                 self.lights.append(light)
             return
-        made = self._placed(instance, parent, matrix, key)
-        if made is not None:
-            self.rows[row] = len(self.instances)
+        visibility = self.visibility(obj, parent)
+        worn = self._worn(obj) if visibility else ()
+        for number, mesh in self._meshes(instance, obj, worn) if visibility else ():
+            own_key = (*key, "hair", number) if number else key
+            made = self._placed(instance, matrix, own_key, mesh, worn, visibility)
+            if made is None:
+                continue
+            self.rows[row] += (len(self.instances),)
             self.instances.append(made)
+            if obj.is_shadow_catcher or parent.is_shadow_catcher:
+                line = "shadow catchers are not supported yet; it is shown as any other object"
+                self.warn(f"Object '{obj.name}': {line}")
 
     def light(self, obj, parent, matrix: Array, key: Hashable) -> Light | None:
         """A light object read, None where it gives no light."""
@@ -183,24 +190,31 @@ class SceneReader:
         }
         return read_light(obj, matrix, key, lights, self.warn)
 
-    def _placed(self, instance, parent, matrix: Array, key: Hashable) -> Instance | None:
-        """A mesh object's instance: the previous scene's where nothing of it changed, so that it is known to be so."""
-        obj = instance.object
-        visibility = self.visibility(obj, parent)
-        if not visibility:
-            return None
-        worn = self._worn(obj)
-        wanted, asks_object = self.materials.asked(worn)
-        mesh = self._mesh(obj, wanted)
+    def _meshes(self, instance, obj, worn: tuple[int, ...]) -> Iterator[tuple[int, Mesh]]:
+        """The meshes of an object: its own as number 0, from 1 on the hair that its particle systems grow."""
+        if instance.show_self:
+            yield 0, self._mesh(obj, self.materials.asked(worn)[0])
+        if obj.type != "MESH" or not obj.particle_systems or not instance.show_particles:
+            return
+        for number, system in enumerate(obj.particle_systems, 1):
+            if has_strands(system):
+                state = (mesh_key(obj.data), number)
+                mesh = self.known.get(state) or self.hair.particles(obj, system, for_viewport=self.for_viewport)
+                self.states[state] = self._used(mesh)
+                yield number, mesh
+
+    def _placed(
+        self, instance, matrix: Array, key: Hashable, mesh: Mesh, worn: tuple[int, ...], visibility: Visibility
+    ) -> Instance | None:
+        """A mesh's instance: the previous scene's where nothing of it changed, so that it is known to be so."""
         if mesh.triangle_count == 0:
             return None
-        if obj.is_shadow_catcher or parent.is_shadow_catcher:
-            self.warn(f"Object '{obj.name}': shadow catchers are not supported yet; it is shown as any other object")
+        obj = instance.object
         slots = worn + worn[-1:] * max(mesh.slots[-1][0] + 1 - len(worn), 0)
         if is_own_surface(key, obj.original.session_uid):
             self.transfers.add(obj, key)
         told: dict = {}
-        if asks_object:
+        if self.materials.asked(worn)[1]:
             told = {"color": tuple(obj.color), "index": obj.pass_index, "random": instance.random_id / MOST_RANDOM_ID}
         old = self.before.get(key)
         same = old is not None and old.mesh == mesh.key and old.materials == slots and old.visibility is visibility
@@ -211,6 +225,8 @@ class SceneReader:
 
     def _mesh(self, obj, wanted: tuple[str, ...]) -> Mesh:
         """The mesh of an object: one met before, one of the previous scene, or read now."""
+        if obj.type != "MESH":
+            return self._used(self.hair.read(obj, self.warn))
         data = obj.data
         uid = data.session_uid
         if (uid, wanted) in self.read_by_uid:

@@ -25,7 +25,7 @@ class _Read:
     """What is remembered of the depsgraph's items when they were read."""
 
     place: tuple  # which scene, view layer and frame
-    rows: tuple[int | None, ...]  # SceneReader.rows
+    rows: tuple[tuple[int, ...], ...]  # SceneReader.rows
     matrices: Array  # (n, 4, 4) float32
     ids: Array  # (n,) int32: hashes of what each item is
     instancers: frozenset[int]  # session uids of the objects that place others
@@ -37,7 +37,8 @@ class SceneFollower:
     def __init__(self) -> None:
         self.scene = Scene()
         self._read: _Read | None = None
-        self._known: dict[Hashable, Mesh] = {}  # by meshes.mesh_key
+        self._known: dict[tuple, Mesh] = {}  # by meshes.mesh_key
+        self._states: set[tuple[tuple, Hashable]] = set()  # the same without what materials ask for, and Mesh.key
 
     def read(
         self,
@@ -57,6 +58,7 @@ class SceneFollower:
         reader = SceneReader(depsgraph, for_viewport, self.scene, visible, on_main_thread, self._known)
         reader.add_all()
         self.scene, self._known = reader.scene(), reader.states
+        self._states = {(state[:3], mesh.key) for state, mesh in reader.states.items()}
         if for_viewport and reader.is_whole:
             ids, matrices = _item_ids(depsgraph, len(reader.rows)), instance_matrices(depsgraph, len(reader.rows))
             self._read = _Read(_place(depsgraph), tuple(reader.rows), matrices, ids, frozenset(reader.instancers))
@@ -74,16 +76,15 @@ class SceneFollower:
         reader = SceneReader(depsgraph, True, Scene())
         instances, lights = list(scene.instances), list(scene.lights)
         for row in changed:
-            number, matrix = before.rows[row], matrices[row].astype(np.float64)
-            if number is None:
-                continue
-            if number >= 0:
-                instances[number] = replace(instances[number], world_from_object=matrix)
-                continue
-            light = _moved_light(reader, lights[~number], matrix, moved)
-            if light is None:
-                return None
-            lights[~number] = light
+            matrix = matrices[row].astype(np.float64)
+            for number in before.rows[row]:
+                if number >= 0:
+                    instances[number] = replace(instances[number], world_from_object=matrix)
+                    continue
+                light = _moved_light(reader, lights[~number], matrix, moved)
+                if light is None:
+                    return None
+                lights[~number] = light
         for instance in scene.instances:
             obj = moved.get(instance.key[0]) if len(instance.key) == 1 else None  # type: ignore[index, arg-type]
             if obj is not None and not self._is_as_before(reader, obj, instance):
@@ -95,8 +96,8 @@ class SceneFollower:
 
     def _is_as_before(self, reader: SceneReader, obj, instance: Instance) -> bool:
         """Whether an object is all that it was but for its place: a script can change more in one go."""
-        mesh = self._known.get(mesh_key(obj.data))
-        return mesh is not None and mesh.key == instance.mesh and reader.visibility(obj, obj) is instance.visibility
+        known = obj.type == "MESH" and (mesh_key(obj.data), instance.mesh) in self._states
+        return known and reader.visibility(obj, obj) is instance.visibility
 
 
 def _place(depsgraph) -> tuple:

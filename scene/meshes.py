@@ -32,7 +32,7 @@ LAYERS = {
 FLATNESS = 1e-7
 
 
-def mesh_key(mesh, wanted: tuple[str, ...] = ()) -> Hashable:
+def mesh_key(mesh, wanted: tuple[str, ...] = ()) -> tuple:
     """Names the state of an evaluated bpy mesh, quickly: where it is the same, so is ``content_key``.
 
     The session uid of evaluated data is new after every evaluation of the geometry and shared by all instances.
