@@ -276,7 +276,7 @@ class SceneReader:
             camera = False
         return _visibility(camera, shadow, bounce, holdout, receives)
 
-    def _unique_key(self, instance, obj, parent) -> Hashable:
+    def _unique_key(self, instance, obj, parent) -> tuple:
         """A key that stays while objects are moved and edited: who places whom, and the place's number."""
         key: tuple = (parent.original.session_uid,)
         if instance.is_instance:
