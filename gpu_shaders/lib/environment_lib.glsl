@@ -49,3 +49,13 @@ float environment_level_of(sampler2D environment_tx, float omega)
   float side = float(textureSize(environment_tx, 0).y);
   return 0.5 * log2(max(omega * side * side * (1.0 / (4.0 * 3.14159265)), 1.0));
 }
+
+/* Rays that the first one counts for. */
+const float ENVIRONMENT_RAYS = 4.0;
+
+/* The level over which a ray of some density is blurred: what one of the rays so far stands for, which falls with their number
+ * (Krivanek & Colbert, "Real-time Shading with Filtered Importance Sampling", 2008). */
+float environment_level_of_ray(sampler2D environment_tx, float density, int number)
+{
+  return environment_level_of(environment_tx, 1.0 / max(ENVIRONMENT_RAYS * float(number + 1) * density, 1e-6));
+}

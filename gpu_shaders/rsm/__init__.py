@@ -7,6 +7,7 @@ C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
    the paper's disc around the pixel's own place in the map as published, or from that disc with exact weights.
 3. Screen-space interpolation (section 4.2 of the paper): gather on a coarse grid of pixels, reuse where plane and
    normal agree, gather in full where they do not.
+4. Add the world's light (``frame.environment_light``), which the paper does not know.
 
 Limits: no visibility between texel and pixel, so bounced light passes walls; diffuse reflectors only; one bounce;
 cost grows with every light.
@@ -21,6 +22,7 @@ from ...device.interface import Device, Target, Texture
 from ...device.shader import Shader
 from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
 from ..frame.draws import ADD
+from ..frame.environment_light import EnvironmentLight
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.map_views import draw_maps, map_views
 from ..frame.maps import Atlas
@@ -33,7 +35,7 @@ WORK_SOFTWARE, WORK_HARDWARE = 1 << 26, 1 << 31
 # Lookups of one pixel in one pass: Mesa's software renderer ends all loops of a shader after 65535 rounds, in silence.
 LONGEST_LOOP = 1 << 15
 # How far a sample is after maps and coarse grid, for the progress bar.
-MAPS_DONE, COARSE_DONE = 0.2, 0.6
+WORLD_DONE, MAPS_DONE, COARSE_DONE = 0.1, 0.2, 0.6
 Passes = Iterator[tuple[Shader, Mapping[str, Any], float]]  # shader, its constants, progress
 # However many lights there are, each gives at least this many: two from the disc, two from the whole map.
 LEAST_GATHERS_A_LIGHT = 4
@@ -144,15 +146,19 @@ class Rsm:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.maps = ReflectiveShadowMaps(device)
+        self._world = EnvironmentLight(device)
         self._none = device.texture((1, 1), "R32F")
         self._coarse: tuple[Texture, Target] | None = None
         self._reuse: tuple[Texture, Target] | None = None  # of the target that is interpolated into
 
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
-        """Irradiance / pi of one diffuse bounce, added to the indirect diffuse light; see ``Technique.indirect``."""
+        """One diffuse bounce, and the world's light; see ``Technique.indirect``."""
         target = targets.diffuse_indirect
+        for done in self._world.draw(inputs, targets):
+            yield WORLD_DONE * done
+        inputs.mark("world")
         for done in self.maps.update(inputs.gpu_scene, int(settings["resolution"])):
-            yield MAPS_DONE * done
+            yield WORLD_DONE + (MAPS_DONE - WORLD_DONE) * done
         inputs.mark("light maps")
         if not self.maps.tiles:
             return
@@ -202,6 +208,7 @@ class Rsm:
 
     def free(self) -> None:
         self.maps.free()
+        self._world.free()
         for resource in (self._none, *(self._coarse or ()), *(self._reuse or ())):
             self.device.free(resource)
         self._coarse = self._reuse = None

@@ -6,8 +6,6 @@
 
 /* Apart from the seeds of the candidates. */
 const int REFLECT_SEED = 2048;
-/* Rays that the first one counts for. */
-const float REFLECT_RAYS = 4.0;
 
 void main()
 {
@@ -34,9 +32,8 @@ void main()
   float far = voxel_trace(origin, direction, 1e30);
   if (far < 0.0) {
     if (vpl_frame.mirrored != 0) {
-      /* Blurred over what one of the rays so far stands for (Krivanek & Colbert 2008): that falls with their number. */
-      float rays = REFLECT_RAYS * float(vpl_frame.number + 1) * bxdf_sample_density(N, V, direction, specular.a);
-      float level = environment_level_of(environment_tx, 1.0 / max(rays, 1e-6));
+      float density = bxdf_sample_density(N, V, direction, specular.a);
+      float level = environment_level_of_ray(environment_tx, density, vpl_frame.number);
       out_direct = vec4(weight * environment_radiance(environment_tx, direction, level), 1.0);
     }
     return;

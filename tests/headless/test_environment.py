@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rebound.gpu_shaders.frame.environment_map import harmonics, pyramid, texel_directions, texel_omegas, without_suns
-from rebound.scene.data import Image, World
+from rebound.scene.data import Image, Material, World
 from rebound.scene.node_graph import COLOR, FLOAT, SHADER, VECTOR, Input, Link, Node, NodeGraph, Place, Values
-from rebound.tests.support.render_scenes import Studio, ortho, perspective, quad, sphere
+from rebound.tests.support.render_scenes import Studio, box, ortho, perspective, quad, sphere
 from rebound.tests.support.vpl_scenes import VPL, still
 
 
@@ -157,3 +157,33 @@ def test_nothing_is_drawn_again_for_a_world_that_stays(studio):
     assert (environment.drawn, environment.revision) == (before[0] + 1, before[1] + 1)
     studio.render(lit_by(pixels, [quad("floor")], strength=2.0, seen=False), ortho(8, 8, 1.0), 1, **VPL)
     assert environment.drawn == before[0] + 1
+
+
+RSM = {"method": "RSM"}
+
+
+def test_a_method_without_a_sky_of_its_own_takes_the_irradiance_of_harmonics(studio):
+    d, omega = directions_of(64)
+    pixels = 0.2 + np.maximum(d[..., 2:], 0) * [1.0, 2.0, 3.0] + np.maximum(d[..., :1], 0)
+    truth = (pixels * (np.maximum(d[..., 2], 0) * omega)[..., None]).sum((0, 1)) / np.pi
+    found = studio.render(lit_by(pixels, [quad("floor")]), ortho(16, 16, 1.0), 4, ("diffuse_direct",), **RSM)
+    np.testing.assert_allclose(found["diffuse_direct"].mean((0, 1))[:3], truth, rtol=0.01)
+    hidden = lit_by(pixels, [box("room", (-1, -1, -1), (1, 1, 1), inward=True)])
+    found = studio.render(hidden, ortho(16, 16, 1.0, position=(0, 0, 0.9)), 4, ("diffuse_direct",), **RSM)
+    assert found["diffuse_direct"].max() == 0.0
+
+
+@pytest.mark.parametrize("settings", [VPL, RSM], ids=["vpl", "rsm"])
+def test_a_mirror_shows_the_panorama(studio, settings):
+    pixels = np.zeros((64, 128, 3))
+    pixels[32:, :64], pixels[32:, 64:] = [1.0, 2.0, 0.5], [0.5, 1.0, 3.0]  # towards +Y, towards -Y
+    mirror = Material("mirror", (1.0, 1.0, 1.0), metallic=1.0, roughness=0.1)
+    shown = replace(lit_by(pixels, [quad("floor")]), materials=(mirror,))
+    for y, color in ((-4.0, [1.0, 2.0, 0.5]), (4.0, [0.5, 1.0, 3.0])):
+        view = perspective(16, 16, 10.0, position=(0, y, 2), target=(0, 0, 0))
+        found = studio.render(shown, view, 8, ("glossy_direct",), **settings)["glossy_direct"]
+        np.testing.assert_allclose(found.mean((0, 1))[:3], color, rtol=0.03)
+        unseen = studio.render(
+            replace(shown, world=replace(shown.world, glossy=False)), view, 2, ("glossy_direct",), **settings
+        )
+        assert unseen["glossy_direct"].max() == 0.0
