@@ -10,18 +10,16 @@ import numpy as np
 
 from ...device.interface import Device, Target, Texture
 from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
-from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
+from .filtering import AtrousFilter, Upsampling
+from .reflections import Reflections
 from .shaders import (
     ATLAS_SAMPLERS,
-    ATROUS,
     GATHER,
     GATHER_TO_REUSE,
-    REFLECT,
     REUSE,
-    UPSAMPLE,
     VIEW_BOUND,
     VIEW_HISTORY,
     VIEW_RESOLUTION,
@@ -37,8 +35,6 @@ LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
 SETTLING = 4
 # Samples that an old reservoir may stand for.
 MOST_REUSE = 2.0
-# Distances between the texels that one pass of the filter compares.
-FILTER_STEPS = (1, 2, 4)
 # What the reuse reads of the candidates' samplers and blocks.
 REUSE_READS = (*ATLAS_SAMPLERS, *VOXEL_SAMPLERS, "voxel_grid", "vpl_frame", "position_tx")
 # How far the gathering is after its passes, for the progress bar.
@@ -62,8 +58,8 @@ class PoolState:
 class _Grid:
     """Textures of one grid of gathering pixels. Those in pairs have the newest first.
 
-    Direct light that the gathering found is a part of its light; ``emitted``, ``direct_histories`` and ``direct_noisy``
-    keep it apart, empty where there is none.
+    Direct light that the gathering found is a part of its light; ``emitted`` and ``direct_histories`` keep it apart,
+    empty where there is none.
     """
 
     size: tuple[int, int]
@@ -72,30 +68,24 @@ class _Grid:
     gathered: list[Texture]
     reservoirs: list[Texture]
     histories: list[Texture]
-    noisy: list[Texture]
     emitted: list[Texture]
     direct_histories: list[Texture]
-    direct_noisy: list[Texture]
     gather_targets: list[Target]
     reuse_targets: list[Target]
-    noisy_targets: list[Target]
-    reflected: list[Texture]
-    reflect_target: Target
+    filter: AtrousFilter
 
     @property
     def resources(self) -> tuple[Texture | Target, ...]:
-        targets = (*self.gather_targets, *self.reuse_targets, *self.noisy_targets, self.reflect_target)
         return (
-            *targets,
+            *self.gather_targets,
+            *self.reuse_targets,
+            *self.filter.resources,
             *self.surfaces,
             *self.gathered,
             *self.reservoirs,
             *self.histories,
-            *self.noisy,
             *self.emitted,
             *self.direct_histories,
-            *self.direct_noisy,
-            *self.reflected,
         )
 
     def turn(self) -> None:
@@ -138,6 +128,7 @@ class Gathering:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._grid: _Grid | None = None
+        self._reflections = Reflections(device)
         self._before: _Before | None = None
         self._drawn: _Before | None = None  # the newest picture, reused or not
         self._whole = True  # whether the newest sample came to its end
@@ -169,20 +160,33 @@ class Gathering:
         )
         yield GATHER_DONE
         now = self._now(inputs, stride, offset, about.sources_revision)
+        up = Upsampling(self.device, inputs, grid.surfaces[0], stride, offset)
         if reuses:
-            self._reuse(inputs, grid, candidates, now, about.settles)
-            light, direct = self._filtered(grid) if settings["denoise"] else (grid.noisy[0], grid.direct_histories[:1])
-            self._upsample(inputs, now, grid.surfaces[0], light, targets.diffuse_indirect)
-            for part in direct:
-                self._upsample(inputs, now, grid.surfaces[0], part, targets.diffuse_indirect, gain=-1.0)
-                self._upsample(inputs, now, grid.surfaces[0], part, targets.diffuse_direct)
+            history, reuse = self._most(inputs, now, about.settles)
+            self._reuse(inputs, grid, candidates, now, history, reuse)
+            light, direct = grid.filter.light[0], grid.direct_histories[:1]
+            if settings["denoise"]:
+                light, direct = grid.filter.run(grid.surfaces[0], direct)
+            up.share_out(light, direct, targets.diffuse_indirect, targets.diffuse_direct)
         else:
+            history = 0.0
             for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
-                self._upsample(inputs, now, grid.surfaces[0], light, target)
+                up.add(light, target)
         inputs.mark("gather")
-        if inputs.gpu_scene.is_glossy:
+        if glossy:
             yield FILTER_DONE
-            self._reflect(inputs, settings, candidates, grid, now, targets)
+            self._reflections.draw(
+                inputs,
+                candidates,
+                grid.size,
+                stride,
+                offset,
+                (self._before or now).block(),
+                most_history=history,
+                mean=reuses,
+                denoise=bool(settings["denoise"]),
+                targets=targets,
+            )
             inputs.mark("reflect")
         self._before, self._drawn = now if reuses else None, now
         self._whole = True
@@ -207,7 +211,7 @@ class Gathering:
             pc_stride=now.stride,
             pc_offset=now.offset,
         )
-        self._upsample(inputs, now, surface, light, target)
+        Upsampling(self.device, inputs, surface, now.stride, now.offset).add(light, target)
         for resource in (own, surface, light, rest):
             self.device.free(resource)
 
@@ -238,25 +242,36 @@ class Gathering:
     def free(self) -> None:
         for resource in self._grid.resources if self._grid else ():
             self.device.free(resource)
+        self._reflections.free()
         self._grid = self._before = self._drawn = None
 
-    def _reuse(
-        self, inputs: FrameInputs, grid: _Grid, candidates: Mapping[str, Any], now: _Before, pool_settles: bool
-    ) -> None:
+    def _most(self, inputs: FrameInputs, now: _Before, pool_settles: bool) -> tuple[float, float]:
+        """Samples that the mean of a surface's light may stand for, and a reservoir of the picture before."""
         before = self._before
-        history = reuse = 0.0
-        if before is not None:
-            still = inputs.sample > 0
-            edited = before.scene_revision != now.scene_revision
-            settled_before = self._settling == 0
-            # Once begun, it lasts as long as the cache's.
-            least = 1 if pool_settles and not settled_before else 0
-            self._settling = SETTLING if edited else max(self._settling - 1, least)
-            history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
-            # Samples of a still view are to be independent, or their mean would converge more slowly.
-            reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
-            if self._settling == 0 and not settled_before:
-                history = reuse = 0.0
+        if before is None:
+            return 0.0, 0.0
+        still = inputs.sample > 0
+        edited = before.scene_revision != now.scene_revision
+        settled_before = self._settling == 0
+        # Once begun, it lasts as long as the cache's.
+        least = 1 if pool_settles and not settled_before else 0
+        self._settling = SETTLING if edited else max(self._settling - 1, least)
+        if self._settling == 0 and not settled_before:
+            return 0.0, 0.0
+        history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
+        # Samples of a still view are to be independent, or their mean would converge more slowly.
+        reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
+        return history, reuse
+
+    def _reuse(
+        self,
+        inputs: FrameInputs,
+        grid: _Grid,
+        candidates: Mapping[str, Any],
+        now: _Before,
+        history: float,
+        reuse: float,
+    ) -> None:
         direct: dict[str, Texture] = {}
         if grid.first_hand:
             direct = {"emitted_tx": grid.emitted[0], "direct_history_tx": grid.direct_histories[1]}
@@ -271,66 +286,9 @@ class Gathering:
             old_surface_tx=grid.surfaces[1],
             old_reservoir_tx=grid.reservoirs[1],
             history_tx=grid.histories[1],
-            old_view=(before or now).block(),
+            old_view=(self._before or now).block(),
             pc_most_reuse=reuse,
             pc_most_history=history,
-        )
-
-    def _reflect(
-        self,
-        inputs: FrameInputs,
-        settings: Mapping[str, Value],
-        candidates: Mapping[str, Any],
-        grid: _Grid,
-        now: _Before,
-        targets: LightTargets,
-    ) -> None:
-        """Add what glossy surfaces reflect."""
-        self.device.fullscreen(
-            REFLECT,
-            grid.reflect_target,
-            normal_tx=inputs.gbuffer.normal,
-            specular_color_tx=inputs.gbuffer.specular,
-            environment_tx=inputs.gpu_scene.environment.texture,
-            **candidates,
-            pc_stride=now.stride,
-            pc_offset=now.offset,
-        )
-        for light, target in zip(grid.reflected, (targets.glossy_indirect, targets.glossy_direct), strict=True):
-            self._upsample(inputs, now, grid.surfaces[0], light, target)
-
-    def _filtered(self, grid: _Grid) -> tuple[Texture, list[Texture]]:
-        """All light, and the part of it that is direct."""
-        newest, direct = 0, grid.direct_histories[:1]
-        for step in FILTER_STEPS:
-            direct_input: dict[str, Any] = {"direct_tx": direct[0]} if direct else {}
-            self.device.fullscreen(
-                ATROUS[grid.first_hand],
-                grid.noisy_targets[1 - newest],
-                surface_tx=grid.surfaces[0],
-                light_tx=grid.noisy[newest],
-                **direct_input,
-                pc_step=step,
-            )
-            newest = 1 - newest
-            direct = grid.direct_noisy[newest : newest + 1]
-        return grid.noisy[newest], direct
-
-    def _upsample(
-        self, inputs: FrameInputs, now: _Before, surface: Texture, light: Texture, target: Target, gain: float = 1.0
-    ) -> None:
-        """Add ``gain`` times the light of the gathering pixels to that of all."""
-        self.device.fullscreen(
-            UPSAMPLE,
-            target,
-            state=ADD,
-            position_tx=inputs.gbuffer.position,
-            normal_tx=inputs.gbuffer.normal,
-            surface_tx=surface,
-            light_tx=light,
-            pc_stride=float(now.stride),
-            pc_offset=now.offset,
-            pc_gain=gain,
         )
 
     def _now(self, inputs: FrameInputs, stride: int, offset: tuple[int, int], sources_revision: int) -> _Before:
@@ -353,10 +311,9 @@ def _new_grid(device: Device, size: tuple[int, int], first_hand: bool) -> _Grid:
     def pair(wanted: bool = True) -> list[Texture]:
         return [device.texture(size, "RGBA32F") for _ in range(2 * wanted)]
 
-    surfaces, gathered, reservoirs, histories, noisy, reflected = pair(), pair(), pair(), pair(), pair(), pair()
-    direct_histories, direct_noisy = pair(first_hand), pair(first_hand)
+    surfaces, gathered, reservoirs, histories, direct_histories = pair(), pair(), pair(), pair(), pair(first_hand)
     emitted = [device.texture(size, "RGBA32F")] if first_hand else []
-    # Reuse writes the first of the noisy pair; the filter goes to and fro between both.
+    atrous = AtrousFilter(device, size, direct_apart=first_hand)
     return _Grid(
         size,
         first_hand,
@@ -364,16 +321,12 @@ def _new_grid(device: Device, size: tuple[int, int], first_hand: bool) -> _Grid:
         gathered,
         reservoirs,
         histories,
-        noisy,
         emitted,
         direct_histories,
-        direct_noisy,
         [device.target([surface, *gathered, *emitted]) for surface in surfaces],
         [
-            device.target([reservoirs[i], histories[i], noisy[0], *direct_histories[i : i + 1]])
+            device.target([reservoirs[i], histories[i], atrous.light[0], *direct_histories[i : i + 1]])
             for i in range(len(reservoirs))
         ],
-        [device.target([noisy[i], *direct_noisy[i : i + 1]]) for i in range(len(noisy))],
-        reflected,
-        device.target(reflected),
+        atrous,
     )

@@ -208,10 +208,25 @@ VIEW_POOL = Shader(
 REFLECT = _candidate_pass(
     "vpl_reflect",
     "vpl/vpl_reflect_frag.glsl",
-    ("out_indirect", "out_direct"),
+    ("out_surface", "out_indirect", "out_direct"),
     ("position_tx", "normal_tx", "specular_color_tx", "environment_tx"),
     _COARSE,
     (_GLOSSY,),
+)
+
+REFLECT_MEAN = Shader(
+    name="vpl_reflect_mean",
+    fragment="vpl/vpl_reflect_mean_frag.glsl",
+    outputs={"out_history": "VEC4", "out_noisy": "VEC4", "out_direct": "VEC4"},
+    samplers={
+        name: "FLOAT_2D"
+        for name in ("surface_tx", "indirect_tx", "direct_tx", "old_surface_tx", "history_tx", "direct_history_tx")
+    },
+    uniforms={"old_view": OLD_VIEW},
+    constants={
+        "pc_most_history": "FLOAT",  # samples that the mean before may stand for
+        "pc_still": "INT",  # 1: the view is that of the picture before
+    },
 )
 
 
@@ -271,13 +286,27 @@ def _atrous(first_hand: bool) -> Shader:
 # By whether direct light is kept apart.
 ATROUS = {first: _atrous(first) for first in _SWITCHES}
 
-UPSAMPLE = Shader(
-    name="vpl_upsample",
-    fragment="vpl/vpl_upsample_frag.glsl",
-    outputs={"out_light": "VEC4"},
-    samplers={"position_tx": "FLOAT_2D", "normal_tx": "FLOAT_2D", "surface_tx": "FLOAT_2D", "light_tx": "FLOAT_2D"},
-    constants={"pc_stride": "FLOAT", "pc_offset": "VEC2", "pc_gain": "FLOAT"},
-)
+
+def _upsample(glossy: bool) -> Shader:
+    name, defines = _with_defines("vpl_upsample", glossy, False)
+    textures = ("position_tx", "normal_tx", "surface_tx", "light_tx", *(("specular_color_tx",) if glossy else ()))
+    return Shader(
+        name=name,
+        fragment="vpl/vpl_upsample_frag.glsl",
+        outputs={"out_light": "VEC4"},
+        samplers={texture: "FLOAT_2D" for texture in textures},
+        constants={
+            "pc_stride": "FLOAT",
+            "pc_offset": "VEC2",
+            "pc_gain": "FLOAT",
+            **({"pc_eye": "VEC4"} if glossy else {}),
+        },
+        defines=defines,
+    )
+
+
+# By whether it is light over a lobe's albedo.
+UPSAMPLE = {glossy: _upsample(glossy) for glossy in _SWITCHES}
 
 INDEX_SCATTER = Shader(
     name="vpl_index_scatter",
@@ -344,7 +373,8 @@ SHADERS = (
     VIEW_OCCLUSION,
     VIEW_POOL,
     REFLECT,
+    REFLECT_MEAN,
     *REUSE.values(),
     *ATROUS.values(),
-    UPSAMPLE,
+    *UPSAMPLE.values(),
 )

@@ -3,8 +3,8 @@
  * light shines at all. The result joins the mean of the light that the surface had before. */
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
+#include "vpl/vpl_history_lib.glsl"
 #include "vpl/vpl_reach_lib.glsl"
-#include "vpl/vpl_surface_lib.glsl"
 
 /* Reservoirs of neighbours that are asked, and from how far, in texels. */
 const int REUSE_NEIGHBOURS = 2;
@@ -36,44 +36,6 @@ void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], 
   Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
   float target = vpl_strength(vpl_light(vpl, at.P, at.N));
   reservoir_offer(r, id, target * stored.y * seen, target, u);
-}
-
-/* The mean of what the four texels around `place` had, of those that show the same surface; w: of how many samples. `moment`
- * is the mean of the squared strength, `direct` the part of the mean that is direct light. */
-vec4 reuse_history(vec2 place, Gatherer at, out float moment, out vec3 direct)
-{
-  ivec2 lower = ivec2(floor(place));
-  vec2 part = place - vec2(lower);
-  ivec2 size = textureSize(history_tx, 0);
-  vec4 sum = vec4(0.0);
-  float weights = 0.0;
-  moment = 0.0;
-  direct = vec3(0.0);
-  for (int i = 0; i < 4; i++) {
-    ivec2 corner = ivec2(i & 1, i >> 1);
-    ivec2 texel = lower + corner;
-    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) {
-      continue;
-    }
-    Gatherer old = surface_unpack(texelFetch(old_surface_tx, texel, 0));
-    vec2 near = mix(1.0 - part, part, vec2(corner)) + 1e-3;
-    float weight = old.exists ? near.x * near.y * surface_alike(at, old) : 0.0;
-    if (weight > 1e-3) {
-      sum += weight * texelFetch(history_tx, texel, 0);
-      moment += weight * texelFetch(old_reservoir_tx, texel, 0).w;
-#ifdef FIRST_HAND
-      direct += weight * texelFetch(direct_history_tx, texel, 0).rgb;
-#endif
-      weights += weight;
-    }
-  }
-  moment /= max(weights, 1e-3);
-  if (weights <= 0.02) {
-    direct = vec3(0.0);
-    return vec4(0.0);
-  }
-  direct /= weights;
-  return sum / weights;
 }
 
 void main()
@@ -140,9 +102,12 @@ void main()
     direct += kind == SOURCE_EMISSION || kind == SOURCE_SKY ? chosen : vec3(0.0);
   }
 
-  float moment = 0.0;
-  vec3 direct_history = vec3(0.0);
-  vec4 history = before ? reuse_history(place, at, moment, direct_history) : vec4(0.0);
+  HistoryTaps taps = HistoryTaps(ivec2(0), vec4(0.0));
+  if (before) {
+    taps = history_taps(old_surface_tx, place, at);
+  }
+  vec4 history = history_mean(taps, history_tx);
+  float moment = history_mean(taps, old_reservoir_tx).w;
   float samples = min(history.w, pc_most_history) + 1.0;
   vec3 mean = mix(history.rgb, light, 1.0 / samples);
   float strength = vpl_strength(light);
@@ -156,6 +121,6 @@ void main()
   out_history = vec4(mean, samples);
   out_noisy = vec4(mean, variance);
 #ifdef FIRST_HAND
-  out_direct = vec4(mix(direct_history, direct, 1.0 / samples), 0.0);
+  out_direct = vec4(mix(history_mean(taps, direct_history_tx).rgb, direct, 1.0 / samples), 0.0);
 #endif
 }

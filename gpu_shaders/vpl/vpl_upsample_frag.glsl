@@ -1,6 +1,10 @@
 /* Joint bilateral upsampling (Kopf et al. 2007): the four gathering pixels around, weighted by nearness and by how well
- * their plane and normal agree with the pixel's own. */
+ * their plane and normal agree with the pixel's own. With GLOSSY, light is over the lobe's albedo until here. */
 #include "vpl/vpl_surface_lib.glsl"
+#ifdef GLOSSY
+#include "lib/bxdf_lib.glsl"
+#include "lib/math_lib.glsl"
+#endif
 
 /* What the worst of neighbours still weighs: a pixel that agrees with none takes the nearest all the same. */
 const float UPSAMPLE_LEAST = 1e-4;
@@ -13,6 +17,12 @@ void main()
   if (position.w <= 0.0) {
     return;
   }
+#ifdef GLOSSY
+  vec4 specular = texelFetch(specular_color_tx, pixel, 0);
+  if (specular.rgb == vec3(0.0)) {
+    return;
+  }
+#endif
   vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
   Gatherer at = Gatherer(position.xyz, N, true);
   vec2 place = (vec2(pixel) - pc_offset) / pc_stride;
@@ -33,5 +43,9 @@ void main()
     sum += weight * texelFetch(light_tx, from, 0).rgb;
     weights += weight;
   }
-  out_light = vec4(weights > 0.0 ? pc_gain * sum / weights : vec3(0.0), 1.0);
+  vec3 light = weights > 0.0 ? pc_gain * sum / weights : vec3(0.0);
+#ifdef GLOSSY
+  light *= bxdf_albedo(specular.rgb, specular.a, dot(N, math_toward(position.xyz, pc_eye)));
+#endif
+  out_light = vec4(light, 1.0);
 }

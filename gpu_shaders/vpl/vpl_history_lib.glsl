@@ -1,0 +1,42 @@
+/* What a surface had in the picture before: means over the texels around its place there that show the same surface. */
+#include "vpl/vpl_surface_lib.glsl"
+
+/* Of the four texels around a place, those that agree less than this in all know nothing of it. */
+const float HISTORY_LEAST = 0.02;
+
+struct HistoryTaps {
+  ivec2 lower;
+  vec4 shares; /* of the texels at lower + (0 0, 1 0, 0 1, 1 1); all zero: there is no history */
+};
+
+HistoryTaps history_taps(sampler2D old_surface_tx, vec2 place, Gatherer at)
+{
+  HistoryTaps taps = HistoryTaps(ivec2(floor(place)), vec4(0.0));
+  vec2 part = place - vec2(taps.lower);
+  ivec2 size = textureSize(old_surface_tx, 0);
+  for (int i = 0; i < 4; i++) {
+    ivec2 corner = ivec2(i & 1, i >> 1);
+    ivec2 texel = taps.lower + corner;
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) {
+      continue;
+    }
+    Gatherer old = surface_unpack(texelFetch(old_surface_tx, texel, 0));
+    vec2 near = mix(1.0 - part, part, vec2(corner)) + 1e-3;
+    float weight = old.exists ? near.x * near.y * surface_alike(at, old) : 0.0;
+    taps.shares[i] = weight > 1e-3 ? weight : 0.0;
+  }
+  float sum = dot(taps.shares, vec4(1.0));
+  taps.shares = sum > HISTORY_LEAST ? taps.shares / sum : vec4(0.0);
+  return taps;
+}
+
+vec4 history_mean(HistoryTaps taps, sampler2D history_tx)
+{
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < 4; i++) {
+    if (taps.shares[i] > 0.0) {
+      sum += taps.shares[i] * texelFetch(history_tx, taps.lower + ivec2(i & 1, i >> 1), 0);
+    }
+  }
+  return sum;
+}
