@@ -9,7 +9,7 @@ ray tracing with dynamic direct lighting", SIGGRAPH 2020.
 4. Points of the surfaces gather from the pool, for further bounces (``cache``, ``index``).
 5. Some of the pixels gather: entries of the pool and a ray, one of them chosen and tested for visibility; reservoirs
    are reused over space and time, the result filtered and brought to all pixels (``gather``).
-6. Glossy pixels follow one reflected ray.
+6. Glossy pixels follow one reflected ray; its light is averaged and filtered as the diffuse one is (``reflections``).
 
 Limits: docs/vpl.md.
 """
