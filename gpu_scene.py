@@ -162,6 +162,8 @@ class GpuScene:
     def _upload_image(self, image: Image) -> Texture:
         self.uploads["images"] += 1
         height, width = image.pixels.shape[:2]
+        if image.pixels.dtype == np.uint8:
+            return self.device.texture((width, height), "RGBA8", image.pixels)
         pixels = np.ascontiguousarray(image.pixels, np.float32)
         largest = pixels.max(initial=0.0)  # a panorama's sun may be brighter than half floats can be
         return self.device.texture((width, height), "RGBA16F" if largest < 6e4 else "RGBA32F", pixels)

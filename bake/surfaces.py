@@ -187,8 +187,4 @@ def _averages(mesh: Mesh, run: slice, material: Material, images: Mapping[Hashab
     if uvs is None:  # as in Blender: without a UV map all of it has one texel
         uvs = np.zeros((len(mesh.positions), 2), np.float32)
     points = np.einsum("kc,tcx->tkx", _SPOTS, uvs.reshape(-1, 3, 2)[run].astype(np.float64))
-    pixels = images[texture.image].pixels
-    size = np.array(pixels.shape[1::-1])
-    texels = np.floor(points * size).astype(np.int64)
-    texels = texels % size if texture.repeat else texels.clip(0, size - 1)
-    return pixels[texels[..., 1], texels[..., 0], :3].mean(axis=1)
+    return images[texture.image].nearest(points, repeat=texture.repeat)[..., :3].mean(axis=1)

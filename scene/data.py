@@ -21,6 +21,21 @@ Array = np.ndarray
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
+def decode_srgb(values: Array) -> Array:
+    """IEC 61966-2-1: linear values of encoded ones, 0..1."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def encode_srgb(values: Array) -> Array:
+    """The way back."""
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0) ** (1 / 2.4) - 0.055)
+
+
+# What bytes stand for.
+BYTES = (np.arange(256) / 255.0).astype(np.float32)
+SRGB_BYTES = decode_srgb(np.arange(256) / 255.0).astype(np.float32)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of one evaluated geometry, expanded to corners and sorted by material slot.
@@ -110,16 +125,45 @@ class BakeState:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Pixels of one image, scene-linear, straight alpha, row 0 at the bottom.
+    """Pixels of one image, straight alpha, row 0 at the bottom: scene-linear numbers, or bytes as a file has them.
 
     ``key`` changes when the pixels do. A missing file has no Image: the material shows magenta instead, as in Blender,
-    and Scene.warnings says so.
+    and Scene.warnings says so. The UDIM tiles of an image lie side by side in one.
     """
 
     key: Hashable
     name: str
-    pixels: Array  # (H, W, 4) float32
+    pixels: Array  # (H, W, 4) float32, or uint8: 0..1 in 255 steps
     warnings: tuple[str, ...] = ()  # what was approximated, for Scene.warnings of every scene that uses it
+    is_srgb: bool = False  # bytes: their colours are to be decoded, after they are filtered
+    tiles: tuple[tuple[int, int, int, int, int], ...] = ()  # UDIM number; x, y, width, height in pixels
+
+    def linear(self, texels: Array | None = None) -> Array:
+        """Scene-linear float32 of some of its texels (..., 4), by default of all."""
+        stored = self.pixels if texels is None else texels
+        if stored.dtype != np.uint8:
+            return stored
+        found = BYTES[stored]
+        if self.is_srgb:
+            found[..., :3] = SRGB_BYTES[stored[..., :3]]
+        return found
+
+    def nearest(self, uv: Array, *, repeat: bool) -> Array:
+        """Scene-linear RGBA at UV coordinates (..., 2): of the nearest texel, magenta where a tile is not there."""
+        tile = np.trunc(uv).astype(np.int64)  # as in Cycles, just below 0 is tile 0's
+        size, at = np.broadcast_to(np.array(self.pixels.shape[1::-1]), uv.shape), np.zeros(uv.shape, np.int64)
+        there = np.ones(uv.shape[:-1], bool)
+        if self.tiles:
+            places = {number: (x, y, w, h) for number, x, y, w, h in self.tiles}
+            numbers = np.where((tile >= 0).all(-1) & (tile[..., 0] < 10), 1001 + tile[..., 0] + 10 * tile[..., 1], 0)
+            rows = np.array([places.get(n, (0, 0, 0, 0)) for n in numbers.ravel().tolist()], np.int64)
+            rows = rows.reshape(*uv.shape[:-1], 4)
+            at, size = rows[..., :2], np.maximum(rows[..., 2:], 1)
+            there, uv = rows[..., 2] > 0, uv - tile
+        texel = np.floor(uv * size).astype(np.int64)
+        texel = at + (texel % size if repeat else texel.clip(0, size - 1))
+        found = self.linear(self.pixels[texel[..., 1], texel[..., 0]])
+        return np.where(there[..., None], found, np.array((1.0, 0.0, 1.0, 1.0), np.float32))
 
 
 @dataclass(frozen=True)

@@ -1,31 +1,21 @@
-"""Blender image -> Image: scene-linear float32 pixels with straight alpha."""
+"""Blender images of a scene -> Image, each read once: files, sequences, UDIM tiles, painted and generated ones."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable, Hashable, Mapping
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Color
 
-from .data import Array, Image
+from .data import Image
+from .pixels import OnMainThread, read_image, reduced
 
-OnMainThread = Callable[[Callable[[], object]], Any]  # runs a call where data-blocks may be made; gives its result
-
-MAX_SIZE = 4096  # pixels along the longer side; larger images are averaged down, so that one of them fits the GPU
-
-# Linear colour spaces by what their Color method is called; the methods differ from Blender version to version.
-LINEAR_SPACES: Mapping[str, str] = {
-    "Linear Rec.709": "from_rec709_linear_to_scene_linear",
-    "Linear": "from_rec709_linear_to_scene_linear",
-    "Linear Rec.2020": "from_rec2020_linear_to_scene_linear",
-    "ACEScg": "from_acescg_to_scene_linear",
-    "ACES2065-1": "from_aces_to_scene_linear",
-    "Linear CIE-XYZ D65": "from_xyz_d65_to_scene_linear",
-}
+MAX_SHEET = 8192  # pixels along a side of a square that all tiles of an image could fill; more are averaged down
 
 
 class ImageReader:
@@ -70,9 +60,11 @@ class ImageReader:
         return key
 
     def _read_pixels(self, image, key: Hashable, path: str) -> Image | None:
+        if image.source == "TILED":
+            return self._on_main_thread(lambda: _read_tiles(image, key))
         if not path:
-            return read_image(image, key)
-        return self._on_main_thread(lambda: _read_frame(image, key, path))
+            return read_image(image, key, self._on_main_thread)
+        return self._on_main_thread(lambda: _read_file(path, image, key))
 
 
 def frame_path(image, user) -> str:
@@ -82,61 +74,72 @@ def frame_path(image, user) -> str:
     return bpy.path.abspath(image.filepath_from_user(image_user=user), library=image.library)
 
 
-def _read_frame(image, key: Hashable, path: str) -> Image | None:
-    """Read one frame of a sequence through a temporary data-block: Image.pixels itself knows no frame.
+def _read_file(path: str, image, key: Hashable) -> Image | None:
+    """Read a frame or a tile through a temporary data-block: Image.pixels itself knows neither.
 
     Only on the main thread, where data-blocks may be made.
     """
     if not os.path.isfile(path):
         return None
-    frame = bpy.data.images.load(path)
+    loaded = bpy.data.images.load(path)
     try:
-        frame.colorspace_settings.name, frame.alpha_mode = image.colorspace_settings.name, image.alpha_mode
-        return read_image(frame, key)
+        loaded.colorspace_settings.name, loaded.alpha_mode = image.colorspace_settings.name, image.alpha_mode
+        return read_image(loaded, key, lambda call: call())
     finally:
-        bpy.data.images.remove(frame)
+        bpy.data.images.remove(loaded)
 
 
-def read_image(image, key: Hashable) -> Image | None:
-    """Read the pixels of a bpy image, or None where it has none. The file is loaded if it was not yet."""
-    width, height = image.size
-    if not (image.has_data and width and height and image.channels):
+def _read_tiles(image, key: Hashable) -> Image | None:
+    """All UDIM tiles of an image, side by side; None where there is not one. Only on the main thread."""
+    numbers = sorted(tile.number for tile in image.tiles)
+    with tempfile.TemporaryDirectory(prefix="rebound-tiles-") as folder:
+        pattern = _tile_pattern(image)
+        if image.is_dirty or image.packed_files or not pattern:  # no files that hold what is seen
+            pattern = str(Path(folder) / f"tile.<UDIM>.{'exr' if image.is_float else 'png'}")
+            image.save(filepath=pattern, save_copy=True)
+        parts = {number: _read_file(tile_path(pattern, number), image, key) for number in numbers}
+    missing = [str(number) for number, part in parts.items() if part is None]
+    lines = [f"Image '{image.name}': tile {', '.join(missing)} is missing; magenta is shown instead"] if missing else []
+    found = {number: part for number, part in parts.items() if part is not None}
+    if not found:
         return None
-    warnings = []
-    if image.source == "TILED":
-        warnings.append(f"Image '{image.name}': only the first UDIM tile is shown")
-    if image.source == "MOVIE":
-        warnings.append(f"Image '{image.name}': of a movie only the frame that Blender has loaded is shown")
-    raw = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(raw)
-    raw = raw.reshape(height, width, image.channels)
-    to_linear, straighten = _to_linear(image, warnings.append), _straightener(image)
-
-    def linear(pixels: Array) -> Array:
-        return straighten(to_linear(_rgba(pixels)))
-
-    step = -(-max(width, height) // MAX_SIZE)
-    if step == 1:
-        return Image(key, image.name, linear(raw), tuple(warnings))
-    warnings.append(f"Image '{image.name}': {width}×{height} is averaged down {step} times to fit {MAX_SIZE} pixels")
-    return Image(key, image.name, _averaged(raw, step, linear), tuple(warnings))
+    lines += dict.fromkeys(line for part in found.values() for line in part.warnings)
+    return replace(_side_by_side(found), name=image.name, warnings=tuple(lines))
 
 
-def _to_linear(image, warn: Callable[[str], None]) -> Callable[[Array], Array]:
-    """The function from stored (H, W, 4) pixels to scene-linear ones, for this image's colour space."""
-    name = image.colorspace_settings.name
-    # Blender converts float files while it loads them; data and scene_linear are used as they are.
-    if image.is_float or image.colorspace_settings.is_data or name in {"scene_linear", ""}:
-        return lambda pixels: pixels
-    if name == "sRGB":
-        matrix = _matrix_of("from_rec709_linear_to_scene_linear")
-        return lambda pixels: _apply(matrix, _decode_srgb(pixels))
-    method = LINEAR_SPACES.get(name)
-    if method and hasattr(Color, method):
-        matrix = _matrix_of(method)
-        return lambda pixels: _apply(matrix, pixels)
-    warn(f"Image '{image.name}': colour space '{name}' is read as sRGB")
-    return _decode_srgb
+def _tile_pattern(image) -> str:
+    """The path of an image's tiles, "" where it has none."""
+    return bpy.path.abspath(image.filepath, library=image.library) if image.filepath else ""
+
+
+def tile_path(pattern: str, number: int) -> str:
+    """The file of a tile by its UDIM number: Blender knows two ways to write it."""
+    across, up = (number - 1001) % 10, (number - 1001) // 10
+    return pattern.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{across + 1}_v{up + 1}")
+
+
+def _side_by_side(parts: Mapping[int, Image]) -> Image:
+    """One image with all tiles in rows, the highest first."""
+    area = sum(part.pixels.shape[0] * part.pixels.shape[1] for part in parts.values())
+    step = int(np.ceil(np.sqrt(area) / MAX_SHEET))
+    alike = len({(part.pixels.dtype, part.is_srgb) for part in parts.values()}) == 1
+    parts = {number: reduced(part, step) for number, part in parts.items()}
+    stored = {number: part.pixels if alike else part.linear() for number, part in parts.items()}
+    widest = max(pixels.shape[1] for pixels in stored.values())
+    wide = max(widest, int(np.ceil(np.sqrt(sum(p.shape[0] * p.shape[1] for p in stored.values())))))
+    places, x, y, high = {}, 0, 0, 0
+    for number in sorted(stored, key=lambda number: -stored[number].shape[0]):
+        height, width = stored[number].shape[:2]
+        if x + width > wide:
+            x, y, high = 0, y + high, 0
+        places[number] = (x, y, width, height)
+        x, high = x + width, max(high, height)
+    sheet = np.zeros((y + high, max(x + w for x, _, w, _ in places.values()), 4), next(iter(stored.values())).dtype)
+    for number, (x, y, width, height) in places.items():
+        sheet[y : y + height, x : x + width] = stored[number]
+    first = next(iter(parts.values()))
+    tiles = tuple((number, *places[number]) for number in sorted(places))
+    return replace(first, pixels=sheet, is_srgb=first.is_srgb and alike, tiles=tiles)
 
 
 def image_key(image, path: str = "") -> Hashable:
@@ -153,6 +156,9 @@ def image_key(image, path: str = "") -> Hashable:
         path,
         _file_time(image, path),
     )
+    if image.source == "TILED":
+        pattern, numbers = _tile_pattern(image), [tile.number for tile in image.tiles]
+        state = (*state, *((number, _written(tile_path(pattern, number))) for number in numbers))
     if image.source == "GENERATED" and not image.is_dirty:
         size = (image.generated_width, image.generated_height)
         return (*state, size, image.use_generated_float, image.generated_type, tuple(image.generated_color))
@@ -165,7 +171,10 @@ def _file_time(image, path: str) -> int:
     """When the file behind an image was written: a reload after an edit elsewhere is seen by it. 0 without a file."""
     if image.packed_file or not image.filepath:
         return 0
-    path = path or bpy.path.abspath(image.filepath, library=image.library)
+    return _written(path or bpy.path.abspath(image.filepath, library=image.library))
+
+
+def _written(path: str) -> int:
     return os.stat(path).st_mtime_ns if os.path.isfile(path) else 0
 
 
@@ -174,90 +183,3 @@ def _pixel_hash(image) -> bytes:
     raw = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(raw)
     return hashlib.blake2b(raw.data, digest_size=16).digest()
-
-
-def _rgba(raw: Array) -> Array:
-    """Any number of stored channels to four: grey is spread, a missing alpha is 1."""
-    height, width, channels = raw.shape
-    if channels == 4:
-        return raw
-    pixels = np.ones((height, width, 4), np.float32)
-    if channels < 3:
-        pixels[..., :3] = raw[..., :1]
-        if channels == 2:
-            pixels[..., 3] = raw[..., 1]
-    else:
-        pixels[..., :3] = raw[..., :3]
-    return pixels
-
-
-def _averaged(raw: Array, step: int, linear: Callable[[Array], Array]) -> Array:
-    """Averages step×step blocks in linear light, a strip of rows at a time to bound the memory; cuts off the rest."""
-    height, width = raw.shape[0] // step, raw.shape[1] // step
-    width, height = max(width, 1), max(height, 1)
-    across, down = min(step, raw.shape[1]), min(step, raw.shape[0])
-    out = np.empty((height, width, 4), np.float32)
-    for row in range(height):
-        strip = linear(raw[row * down : (row + 1) * down, : width * across])
-        out[row] = strip.reshape(down, width, across, 4).mean(axis=(0, 2))
-    return out
-
-
-def _straightener(image) -> Callable[[Array], Array]:
-    """The function to straight alpha: byte images have it; float files keep their colours multiplied by alpha.
-
-    As in Cycles, which keeps all but data and packed channels multiplied, no colour is left where alpha is 0.
-    """
-    if image.alpha_mode == "NONE":
-        return _opaque
-    if image.is_float and image.alpha_mode == "PREMUL":
-        return _divided_by_alpha
-    if image.alpha_mode == "STRAIGHT" and not image.colorspace_settings.is_data:
-        return _black_where_clear
-    return lambda pixels: pixels
-
-
-def _opaque(pixels: Array) -> Array:
-    out = pixels.copy()
-    out[..., 3] = 1.0
-    return out
-
-
-def _black_where_clear(pixels: Array) -> Array:
-    clear = pixels[..., 3] == 0.0
-    if not clear.any():
-        return pixels
-    out = pixels.copy()
-    out[clear, :3] = 0.0
-    return out
-
-
-def _divided_by_alpha(pixels: Array) -> Array:
-    alpha = pixels[..., 3:]
-    if (alpha == 1.0).all():
-        return pixels
-    out = pixels.copy()
-    np.divide(pixels[..., :3], alpha, out=out[..., :3], where=alpha > 0.0)
-    return out
-
-
-def _decode_srgb(pixels: Array) -> Array:
-    """IEC 61966-2-1 on the colour channels; a byte image has only 256 values, so a table is exact and fast."""
-    values = np.arange(256, dtype=np.float64) / 255.0
-    table = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    out = pixels.copy()
-    out[..., :3] = table[np.rint(np.clip(pixels[..., :3], 0.0, 1.0) * 255.0).astype(np.uint8)]
-    return out
-
-
-def _matrix_of(method: str) -> Array:
-    """The (3, 3) matrix behind one of mathutils.Color's conversions to Blender's working space."""
-    return np.array([tuple(getattr(Color(axis), method)()) for axis in np.eye(3)], np.float32).T
-
-
-def _apply(matrix: Array, pixels: Array) -> Array:
-    if np.allclose(matrix, np.eye(3), atol=1e-4):
-        return pixels
-    out = pixels.copy()
-    out[..., :3] = pixels[..., :3] @ matrix.T
-    return out

@@ -60,7 +60,7 @@ class MaterialTable:
         return tuple(self.materials)
 
     def _read(self, material) -> Material:
-        read = read_graph(material, self.images.read)
+        read = read_graph(material, self.images.read, image_of=self.images.images.get)
         if read.unsupported:
             self.warn(f"Material '{material.name}': {'; '.join(read.unsupported)}")
         for how in _approximations(read, material):
@@ -78,9 +78,9 @@ class MaterialTable:
     def _mean(self, image: Hashable) -> Array:
         """RGBA, (4,) float64: of every so many rows and columns, as it is a guess anyway."""
         if image not in self._means:
-            pixels = self.images.images[image].pixels
-            rows, columns = (max(n // 64, 1) for n in pixels.shape[:2])
-            self._means[image] = pixels[::rows, ::columns].mean((0, 1), dtype=np.float64)
+            read = self.images.images[image]
+            rows, columns = (max(n // 64, 1) for n in read.pixels.shape[:2])
+            self._means[image] = read.linear(read.pixels[::rows, ::columns]).mean((0, 1), dtype=np.float64)
         return self._means[image]
 
 

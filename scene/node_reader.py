@@ -10,8 +10,10 @@ import math
 from collections.abc import Callable, Hashable, Mapping
 
 import bpy
+import numpy as np
 
 from ..gpu_shaders.materials import gives, is_supported
+from .data import Image
 from .node_graph import (
     COLOR,
     FLOAT,
@@ -34,6 +36,8 @@ ReadImage = Callable[[object, object], Hashable | None]  # an image and its user
 # A Sky Texture node -> the key of its picture, and its sun: a number or a colour by name.
 ReadSky = Callable[[object], tuple[Hashable, Mapping[str, tuple[float, ...]]]]
 
+ImageOf = Callable[[Hashable], Image | None]
+
 MAX_DEPTH = 50  # calls within one another: nodes are read inputs first, so only circles of links go deeper than a few
 MAX_IMAGES = 16  # of one material: what is left of a shader's 32 samplers for its other inputs and those of the frame
 MAGENTA = (1.0, 0.0, 1.0)  # Blender's colour for a missing image
@@ -49,12 +53,15 @@ CONSTANTS = {"ShaderNodeRGB", "ShaderNodeValue"}
 DIFFUSE_OF = ("Base Color", "Color")
 
 
-def read_graph(material, read_image: ReadImage, read_sky: ReadSky | None = None) -> ReadGraph:
+def read_graph(
+    material, read_image: ReadImage, read_sky: ReadSky | None = None, image_of: ImageOf | None = None
+) -> ReadGraph:
     """The graph of a bpy material's or world's surface. Black where nothing is linked to its output, as in Cycles.
 
     A material without nodes is a Diffuse BSDF of its viewport colour. A Sky Texture is read where ``read_sky`` does.
+    Without ``image_of`` all images are taken for scene-linear ones of one tile.
     """
-    reader = _Reader(read_image, read_sky)
+    reader = _Reader(read_image, read_sky, image_of or (lambda key: None))
     tree, socket = node_tree(material), None
     if tree is None:
         surface = reader.diffuse(tuple(material.diffuse_color[:3]))
@@ -75,7 +82,7 @@ def read_graph(material, read_image: ReadImage, read_sky: ReadSky | None = None)
 
 
 class _Reader:
-    def __init__(self, read_image: ReadImage, read_sky: ReadSky | None):
+    def __init__(self, read_image: ReadImage, read_sky: ReadSky | None, image_of: ImageOf):
         self.nodes: list[Node] = []
         self.values = Values()
         self.images: dict[Hashable, None] = {}
@@ -83,6 +90,7 @@ class _Reader:
         self._normal: Link | Place = Place("normal")  # what normals are that nothing is linked to
         self._read_image = read_image
         self._read_sky = read_sky
+        self._image_of = image_of
         self._links: dict[tuple, int | None] = {}  # None: being read
         self._depth = 0
 
@@ -258,9 +266,16 @@ class _Reader:
         extra, options = self._properties(node)
         # As in Cycles: a colour whose alpha goes nowhere is dark where it is transparent.
         straight = any(s.identifier == "Alpha" and s.is_linked for s in node.outputs)
-        data = node.image.colorspace_settings.is_data
-        options.append(("alpha", "DATA" if data else "STRAIGHT" if straight else "TIMES"))
-        return self._append(found, extra, options, image=list(self.images).index(key))
+        apart = node.image.colorspace_settings.is_data or node.image.alpha_mode == "CHANNEL_PACKED"
+        image, table = self._image_of(key), -1
+        options.append(("alpha", "DATA" if apart else "STRAIGHT" if straight else "TIMES"))
+        options.append(("is_srgb", image is not None and image.is_srgb))
+        options.append(("tiled", image is not None and bool(image.tiles)))
+        if image is not None and image.tiles:
+            rows = _tile_rows(image)
+            table = self.values.add_table(rows)
+            extra.append(("tiles", self.values.add(FLOAT, (float(len(rows)),))))
+        return self._append(found, extra, options, table, list(self.images).index(key))
 
     def _sky(self, found: Socket, read_sky: ReadSky) -> int:
         key, sun = read_sky(found.node)
@@ -340,3 +355,11 @@ def numbers(value, type: str) -> tuple[float, ...]:
     count = 1 if type == FLOAT else 3
     several = (several * count if len(several) == 1 else several)[:count]
     return tuple(v if math.isfinite(v) else 0.0 for v in several)
+
+
+def _tile_rows(image: Image) -> np.ndarray:
+    """(n, 4): where the tiles 1001, 1002, … lie in an image, x, y, width, height; zeros where there is none."""
+    rows = np.zeros((max(tile[0] for tile in image.tiles) - 1000, 4))
+    for number, *place in image.tiles:
+        rows[number - 1001] = place
+    return rows

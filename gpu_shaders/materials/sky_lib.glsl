@@ -39,7 +39,7 @@ vec3 sky_radiance(sampler2D sky_tx, SkySun sun, vec3 direction, float footprint)
   vec2 place = vec2(fract((turn - sun.turn) / (2.0 * SKY_PI) + 0.5), 0.5 + 0.5 * (elevation < 0.0 ? -up : up));
   /* Around it the picture repeats; above and below, it ends. */
   place.y = clamp(place.y, 0.5 / float(textureSize(sky_tx, 0).y), 1.0 - 0.5 / float(textureSize(sky_tx, 0).y));
-  vec3 sky = texture_sample(sky_tx, place, 0, 0, 0).rgb;
+  vec3 sky = texture_sample(sky_tx, place, 0, 0, 0, false).rgb;
   if (sun.radius > 0.0 && elevation > sun.earth) {
     sky += sky_disc(sun, d, elevation, footprint);
   }

@@ -110,23 +110,32 @@ _ALPHA = {"DATA": 0, "TIMES": 1, "STRAIGHT": 2}
 
 
 def image(node: Node) -> Code:
-    filtering, extension = _FILTERS[str(node.option("interpolation"))], _EXTENSIONS[str(node.option("extension"))]
-    modes, kind = f"{filtering}, {extension}, {_ALPHA[str(node.option('alpha'))]}", node.option("projection")
+    modes, kind, tiled = _modes(node), node.option("projection"), _has(node, "tiled")
     if kind == "BOX":
-        call = f"texture_box({{image}}, {{Vector}}, point.object_normal, {{projection_blend}}, {modes})"
-    elif kind == "FLAT":
-        call = f"texture_sample({{image}}, {{Vector}}.xy, {modes})"
+        first = "tile_first({image}, {table})" if tiled else "texture_whole({image})"
+        call = f"texture_box({{image}}, {first}, {{Vector}}, point.object_normal, {{projection_blend}}, {modes})"
     else:
-        call = f"texture_sample({{image}}, texture_{str(kind).lower()}({{Vector}}), {modes})"
-    return Code({"Color": "{v}_i.rgb", "Alpha": "{v}_i.a"}, ("texture",), f"vec4 {{v}}_i = {call};")
+        at = "{Vector}.xy" if kind == "FLAT" else f"texture_{str(kind).lower()}({{Vector}})"
+        tiles = ", {table}, int({tiles})" if tiled else ""
+        call = f"{'tile' if tiled else 'texture'}_sample({{image}}, {at}{tiles}, {modes})"
+    outputs = {"Color": "{v}_i.rgb", "Alpha": "{v}_i.a"}
+    return Code(outputs, ("tile" if tiled else "texture",), f"vec4 {{v}}_i = {call};")
+
+
+def _modes(node: Node) -> str:
+    filtering, extension = _FILTERS[str(node.option("interpolation"))], _EXTENSIONS[str(node.option("extension"))]
+    return f"{filtering}, {extension}, {_ALPHA[str(node.option('alpha'))]}, {str(_has(node, 'is_srgb')).lower()}"
+
+
+def _has(node: Node, name: str) -> bool:
+    return bool(dict(node.options).get(name))
 
 
 def environment(node: Node) -> Code:
     place = "equirectangular" if node.option("projection") == "EQUIRECTANGULAR" else "mirror_ball"
-    filtering = _FILTERS[str(node.option("interpolation"))]
-    return Code(
-        {"Color": f"texture_sample({{image}}, texture_{place}({{Vector}}), {filtering}, 0, 0).rgb"}, ("texture",)
-    )
+    filtering, is_srgb = _FILTERS[str(node.option("interpolation"))], str(_has(node, "is_srgb")).lower()
+    call = f"texture_sample({{image}}, texture_{place}({{Vector}}), {filtering}, 0, 0, {is_srgb}).rgb"
+    return Code({"Color": call}, ("texture",))
 
 
 # The reader's own, of a Sky Texture: its picture, and its sun's disc.

@@ -10,6 +10,7 @@ import pytest
 
 from rebound.main_thread import MainThread
 from rebound.scene import images
+from rebound.scene import pixels as pixels_module
 from rebound.scene.changes import Changes
 from rebound.scene.convert import convert_scene
 from rebound.tests.support.blender_build import convert, link, material, mesh
@@ -46,9 +47,14 @@ def material_of(scene):
 
 
 def pixels_of(scene):
-    found = scene.images[material_of(scene).base_color_texture.image]
-    assert found.pixels.dtype == np.float32 and found.pixels.shape[2] == 4
-    return found.pixels
+    """Scene-linear pixels of the one image there is."""
+    found = image_of(scene).linear()
+    assert found.dtype == np.float32 and found.shape[2] == 4
+    return found
+
+
+def image_of(scene):
+    return scene.images[material_of(scene).base_color_texture.image]
 
 
 RAMP = np.array([[[0, 0.2, 0.4, 1], [0.6, 0.8, 1, 0.4]], [[1, 0, 0, 1], [0, 1, 0, 1]]])
@@ -93,13 +99,20 @@ def test_color_where_alpha_is_zero_is_black_as_in_cycles(float_buffer, mode, spa
     np.testing.assert_allclose(pixels_of(convert())[0, :, 0], (0 if is_black else 1, 1), atol=1e-5)
 
 
-def test_linear_spaces_are_converted_and_others_named():
-    image = painted(pixels=RAMP, space="Linear Rec.709")
-    textured(image)
+def test_linear_spaces_are_converted():
+    textured(painted(pixels=RAMP, space="Linear Rec.709"))
     np.testing.assert_allclose(pixels_of(convert()), np.rint(RAMP * 255) / 255, atol=1e-4)
-    image.colorspace_settings.name = "Filmic sRGB"
-    image.pixels.foreach_set(RAMP.astype(np.float32).ravel())
-    assert any("'Filmic sRGB'" in line for line in convert().warnings)
+
+
+def test_other_spaces_are_blenders_to_convert(tmp_path):
+    """A byte image is read as Blender itself reads a float file of the same numbers."""
+    textured(painted(pixels=RAMP, space="Filmic sRGB"))
+    scene = convert()
+    found, stored = pixels_of(scene), np.rint(RAMP * 255) / 255
+    assert scene.warnings == () and len(bpy.data.images) == 1
+    np.testing.assert_allclose(found[..., 3], stored[..., 3], atol=1e-6)
+    assert (np.diff(found[0, 0, :3]) > 0).all() and not np.allclose(found[..., :3], stored[..., :3], atol=0.05)
+    assert found[1, 0, 0] > 5  # what Filmic shows as white is brighter than that
 
 
 def test_saved_file_and_packed_file_are_read_alike(tmp_path):
@@ -154,7 +167,7 @@ def test_emission_texture_is_multiplied_by_the_strength():
     node = textured(painted(pixels=RAMP), socket="Emission Color")
     node.id_data.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 5
     found = material_of(convert())
-    pixels = next(iter(convert().images.values())).pixels.mean((0, 1))
+    pixels = next(iter(convert().images.values())).linear().mean((0, 1))
     np.testing.assert_allclose(found.emission, 5 * pixels[:3] * pixels[3], rtol=1e-5)
     assert found.graph is not None
     assert found.base_color_texture is None
@@ -180,7 +193,7 @@ def test_only_an_image_by_a_uv_map_is_the_base_colours_texture(output):
 
 
 def test_large_image_is_averaged_down(monkeypatch):
-    monkeypatch.setattr(images, "MAX_SIZE", 4)
+    monkeypatch.setattr(pixels_module, "MAX_SIZE", 4)
     pixels = np.zeros((8, 12, 4))
     pixels[..., 3] = 1
     pixels[:, 6:, 0] = 2
@@ -195,7 +208,7 @@ def test_large_image_is_averaged_down(monkeypatch):
 
 def test_averaging_keeps_a_narrow_image():
     raw = np.ones((1, 9, 4), np.float32)
-    assert images._averaged(raw, 3, lambda pixels: pixels).shape == (1, 3, 4)
+    assert pixels_module._averaged(raw, 3, lambda raw: raw).shape == (1, 3, 4)
 
 
 def test_unchanged_image_is_the_same_object_and_a_painted_one_is_not():
@@ -204,7 +217,7 @@ def test_unchanged_image_is_the_same_object_and_a_painted_one_is_not():
     first = convert()
     second = convert(previous=first)
     assert not Changes.between(first, second).any
-    assert pixels_of(second) is pixels_of(first)
+    assert image_of(second) is image_of(first)
     image.pixels[0] = 0.5
     image.update()
     changes = Changes.between(second, convert(previous=second))
@@ -228,20 +241,88 @@ def test_image_on_two_materials_is_read_once():
     assert len(convert().images) == 1
 
 
-def test_tiled_image_shows_its_first_tile(tmp_path):
-    for number, value in ((1001, 0.25), (1002, 0.75)):
-        tile = painted(str(number), pixels=np.full((2, 2, 4), value), space="Non-Color")
-        tile.file_format, tile.filepath_raw = "PNG", str(tmp_path / f"tile.{number}.png")
+def tiled(tmp_path, sizes, space="Non-Color", pattern="tile.<UDIM>.png"):
+    """An image of files, one for each UDIM number with its size and value."""
+    for number, (size, value) in sizes.items():
+        tile = painted(str(number), size=size, pixels=np.full((size[1], size[0], 4), value), space="Non-Color")
+        tile.file_format, tile.filepath_raw = "PNG", images.tile_path(str(tmp_path / pattern), number)
         tile.save()
-    image = bpy.data.images.load(str(tmp_path / "tile.1001.png"))
-    image.colorspace_settings.name = "Non-Color"
-    image.source = "TILED"
-    image.filepath = str(tmp_path / "tile.<UDIM>.png")
-    image.tiles.new(1002)
+        bpy.data.images.remove(tile)
+    first = min(sizes)
+    image = bpy.data.images.load(images.tile_path(str(tmp_path / pattern), first))
+    image.colorspace_settings.name, image.source = space, "TILED"
+    image.filepath = str(tmp_path / pattern)
+    image.tiles[0].number = first
+    for number in sizes.keys() - {first}:
+        image.tiles.new(number)
+    return image
+
+
+TILES = {1001: ((4, 2), 0.2), 1002: ((2, 6), 0.4), 1012: ((2, 2), 0.6)}
+
+
+def at(image, u, v):
+    return float(image.nearest(np.array([[u, v]]), repeat=True)[0, 0])
+
+
+@pytest.mark.parametrize("pattern", ["tile.<UDIM>.png", "tile_<UVTILE>.png"])
+def test_tiles_lie_side_by_side(tmp_path, pattern):
+    textured(tiled(tmp_path, TILES, pattern=pattern))
+    scene = convert()
+    found = image_of(scene)
+    assert scene.warnings == () and len(bpy.data.images) == 1
+    assert {number: (w, h) for number, _, _, w, h in found.tiles} == {n: size for n, (size, _) in TILES.items()}
+    for u, v, value in ((0.1, 0.9, 0.2), (1.5, 0.5, 0.4), (1.9, 1.1, 0.6)):
+        assert at(found, u, v) == pytest.approx(value, abs=0.01)
+    for u, v in ((0.5, 1.5), (2.5, 0.5), (-1.5, 0.5), (10.5, 0.1)):
+        np.testing.assert_array_equal(found.nearest(np.array([[u, v]]), repeat=True)[0], (1, 0, 1, 1))
+
+
+def test_missing_tile_is_named(tmp_path):
+    image = tiled(tmp_path, TILES)
+    (tmp_path / "tile.1002.png").unlink()
     textured(image)
     scene = convert()
-    assert pixels_of(scene)[0, 0, 0] == pytest.approx(0.25, abs=0.01)
-    assert any("UDIM" in line for line in scene.warnings)
+    assert [tile[0] for tile in image_of(scene).tiles] == [1001, 1012]
+    assert len(scene.warnings) == 1 and "tile 1002 is missing" in scene.warnings[0]
+
+
+def test_rewritten_tile_makes_a_new_image(tmp_path):
+    textured(tiled(tmp_path, TILES))
+    first = convert()
+    assert convert(previous=first).images.keys() == first.images.keys()
+    (tmp_path / "tile.1012.png").write_bytes((tmp_path / "tile.1001.png").read_bytes())
+    second = convert(previous=first)
+    assert at(image_of(second), 1.5, 1.5) == pytest.approx(0.2, abs=0.01)
+
+
+def test_packed_tiles_are_read(tmp_path):
+    image = tiled(tmp_path, TILES)
+    image.pack()
+    for number in TILES:
+        (tmp_path / f"tile.{number}.png").unlink()
+    textured(image)
+    scene = convert()
+    assert scene.warnings == () and at(image_of(scene), 1.5, 1.5) == pytest.approx(0.6, abs=0.01)
+    assert image.packed_files and image.filepath == str(tmp_path / "tile.<UDIM>.png")
+
+
+def test_too_many_texels_of_tiles_are_averaged_down(tmp_path, monkeypatch):
+    monkeypatch.setattr(images, "MAX_SHEET", 3)
+    textured(tiled(tmp_path, {1001: ((4, 4), 0.2), 1002: ((4, 4), 0.8)}))
+    found = image_of(convert())
+    assert found.pixels.shape[0] * found.pixels.shape[1] <= 16
+    assert at(found, 0.5, 0.5) == pytest.approx(0.2, abs=0.01) and at(found, 1.5, 0.5) == pytest.approx(0.8, abs=0.01)
+
+
+def test_bytes_stay_bytes():
+    textured(painted(pixels=RAMP))
+    found = image_of(convert())
+    assert found.pixels.dtype == np.uint8 and found.is_srgb
+    bpy.data.images["Image"].colorspace_settings.name = "Non-Color"
+    bpy.data.images["Image"].pixels.foreach_set(RAMP.astype(np.float32).ravel())
+    found = image_of(convert())
+    assert found.pixels.dtype == np.uint8 and not found.is_srgb
 
 
 def sequence(tmp_path):
@@ -282,9 +363,9 @@ def test_frame_of_a_sequence_is_loaded_on_the_main_thread(tmp_path, monkeypatch)
     sequence(tmp_path)
     bpy.context.scene.frame_set(2)
     depsgraph, main_thread, loaded_on = bpy.context.evaluated_depsgraph_get(), MainThread(), []
-    read_frame = images._read_frame
+    read_file = images._read_file
     monkeypatch.setattr(
-        images, "_read_frame", lambda *args: (loaded_on.append(threading.current_thread()), read_frame(*args))[1]
+        images, "_read_file", lambda *args: (loaded_on.append(threading.current_thread()), read_file(*args))[1]
     )
 
     def render_thread():

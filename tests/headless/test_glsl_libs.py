@@ -123,7 +123,7 @@ def test_image_is_wrapped_and_filtered(call, headless_device, mode, size):
         uv = uv[(np.abs(place_in_texel - 0.5) < 0.49).all(1)]  # no texel's edge, which may round either way
     found = call(
         ["materials/texture_lib.glsl"],
-        f"texture_sample(image_tx, at.xy, {mode & 1}, {mode >> 1}, 0)",
+        f"texture_sample(image_tx, at.xy, {mode & 1}, {mode >> 1}, 0, false)",
         {"at": uv},
         textures=["image_tx"],
         image_tx=texture,

@@ -14,6 +14,7 @@ import numpy as np
 
 from rebound.device import Shader
 from rebound.gpu_shaders.materials import generate
+from rebound.scene.images import ImageReader
 from rebound.scene.node_reader import read_graph
 from rebound.tests.support.blender_build import link
 
@@ -180,10 +181,9 @@ def value_texture(device, values):
 
 
 def image_texture(device, image):
-    """A bpy image as it is, for images that need no conversion."""
-    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    return device.texture(tuple(image.size), "RGBA32F", pixels.reshape(image.size[1], image.size[0], 4))
+    """An image of the scene's, as the GPU has it."""
+    size = image.pixels.shape[1::-1]
+    return device.texture(size, "RGBA8" if image.pixels.dtype == np.uint8 else "RGBA32F", image.pixels)
 
 
 # What the sheet is like: it lies in the plane z = 0, a cell one metre wide, UV along its sides.
@@ -194,9 +194,14 @@ POINT = {
 }
 
 
+def _fail(line):
+    raise AssertionError(line)
+
+
 def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
     """What the generated GLSL emits where the attributes are a and b, (h, w, 3) each: (h, w, 3) float32."""
-    read = read_graph(material, lambda image, user: image.name)
+    reader = ImageReader({}, _fail, lambda call: call())
+    read = read_graph(material, reader.read, image_of=reader.images.get)
     assert not read.unsupported, read.unsupported
     shader = generate(read.filled.graph)
     given = {f"color_{k}": f"{n.name}_tx" for k, n in enumerate(shader.attributes) if n.field == "color"}
@@ -232,9 +237,7 @@ def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
     )
     result = device.texture((CELL, CELL), "RGBA32F")
     sent["value_tx"] = value_texture(device, read.filled.table)
-    sent |= {
-        f"image_{k}_tx": image_texture(device, bpy.data.images[str(name)]) for k, name in enumerate(read.filled.images)
-    }
+    sent |= {f"image_{k}_tx": image_texture(device, reader.images[key]) for k, key in enumerate(read.filled.images)}
     device.fullscreen(program, device.target([result]), pc_values=0, **sent)
     return device.read(result)[..., :3]
 
