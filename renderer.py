@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .baked_light import BakedLight
 from .device.interface import Device, DrawState, Target, Texture
 from .frame import LIGHTS, Frame, new_frame
 from .gpu_scene import Draw, GpuScene
@@ -67,6 +68,7 @@ class Renderer:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._direct = DirectLight(device)
+        self._baked = BakedLight(device)
         self._techniques: dict[str, Technique] = {}
         self._triangles = self._lights = 0
         self.clock = Clock(device)
@@ -119,6 +121,9 @@ class Renderer:
         self.clock.mark("direct light")
         if LAMPS in frame.extras:
             self._add_up(frame, inputs, {("combined",): frame.extras[LAMPS]}, DrawState(), indirect=False)
+        if settings["indirect"] and self._baked.update(gpu_scene, settings):
+            self._baked.draw(inputs, frame.light, glossy=frame.is_glossy)
+            self.clock.mark("baked light")
         # A view of what a technique does is asked of one that does it.
         bounced = technique is not None and (bool(settings["indirect"]) or shown in technique.views)
         if technique is not None and bounced:
@@ -178,6 +183,7 @@ class Renderer:
             "lights": self._lights,
             "triangles": self._triangles,
             "gpu_bytes": self.device.allocated_bytes,
+            "baked_updates": self._baked.updates,
             "shadow_maps": len(self._direct.maps.tiles),
             "shadow_maps_drawn": self._direct.maps.drawn,
             "shadow_resolution": self._direct.maps.atlas.tile if self._direct.maps.atlas else 0,
@@ -193,6 +199,7 @@ class Renderer:
 
     def free(self) -> None:
         self._direct.free()
+        self._baked.free()
         for technique in self._techniques.values():
             technique.free()
         self._techniques.clear()

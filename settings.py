@@ -95,6 +95,47 @@ SETTINGS = (
         ),
     ),
     Setting(
+        "transfer_use",
+        "BOOL",
+        "Use Bakes",
+        "Light objects that have a bake of light transfer by it: the world's light, its shadows and bounces, without "
+        "noise. Off lights them as all others",
+        True,
+    ),
+    Setting(
+        "transfer_bands",
+        "INT",
+        "Used Bands",
+        "How many bands of a bake are used at most. Higher shows all that was baked; lower is softer",
+        6,
+        minimum=1,
+        maximum=11,
+        unit="bands",
+    ),
+    Setting(
+        "transfer_terms",
+        "INT",
+        "Wavelet Terms",
+        "How many terms of the world's light a wavelet bake is lit by, those that matter most. Higher makes shadows "
+        "sharper and truer, at the cost of time whenever the world changes; lower is quicker",
+        256,
+        minimum=1,
+        maximum=24576,
+        unit="terms",
+        soft_maximum=2048,
+    ),
+    Setting(
+        "transfer_window",
+        "FLOAT",
+        "Window",
+        "How much of the finest detail of the world's light is smoothed away, against rings of light and dark around "
+        "bright spots. Higher has fewer rings, lower sharper shadows",
+        0.0,
+        minimum=0.0,
+        maximum=1.0,
+        unit="parts of the curvature",
+    ),
+    Setting(
         "seed",
         "INT",
         "Seed",

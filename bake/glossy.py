@@ -85,7 +85,7 @@ def glossy(
 def _bounced(surfaces: Surfaces, blocked: Blocked, lit: Array, out: Array, rows: Array) -> Array:
     """(len(rows), channels, result², light²): what arrives by way of the surfaces that block, one product a ray."""
     light = reflected(surfaces, blocked, lit)
-    total = np.zeros((len(rows), lit.shape[1], out.shape[1], lit.shape[2]), np.float32)
+    total = np.zeros((len(rows), light.shape[1], out.shape[1], lit.shape[2]), np.float32)
     starts = np.searchsorted(blocked.vertices, rows)
     for row, first, last in zip(range(len(rows)), starts, [*starts[1:], len(light)], strict=True):
         rays = slice(first, last)

@@ -80,3 +80,14 @@ def equirect_solid_angles(height: int, width: int) -> Array:
     """(height, width) steradians of each pixel, exact."""
     edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
     return np.broadcast_to(np.diff(edges)[:, None] * (2.0 * np.pi / width), (height, width))
+
+
+def texel_of(directions: Array, size: int) -> Array:
+    """(n,) the texel of a cube map that each of ``directions`` (n, 3) passes, numbered over faces, t, s."""
+    major = np.abs(directions).argmax(axis=1)
+    rows = np.arange(len(directions))
+    face = 2 * major + (directions[rows, major] < 0)
+    length = np.abs(directions[rows, major])
+    st = [(FACES[face, axis] * directions).sum(axis=1) / length for axis in (1, 2)]
+    s, t = (((place + 1.0) * (0.5 * size)).astype(np.int64).clip(0, size - 1) for place in st)
+    return (face * size + t) * size + s

@@ -105,7 +105,8 @@ def reflected(surfaces: Surfaces, blocked: Blocked, transfer: Array) -> Array:
     corners = surfaces.triangle_vertices[triangles]
     u, v = blocked.u[seen, None, None], blocked.v[seen, None, None]
     at = (1 - u - v) * transfer[corners[:, 0]] + u * transfer[corners[:, 1]] + v * transfer[corners[:, 2]]
-    found = np.zeros((len(blocked.vertices), *transfer.shape[1:]), np.float32)
+    channels = surfaces.reflectance.shape[1]  # light that was not reflected yet has one for all
+    found = np.zeros((len(blocked.vertices), channels, transfer.shape[2]), np.float32)
     found[seen] = at * surfaces.reflectance[triangles][:, :, None]
     return found
 

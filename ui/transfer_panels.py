@@ -9,7 +9,7 @@ import bpy
 from ..bake.file import BakeFileError, read_about
 from ..baking import facts, has_bake, state_of, surfaces
 from ..session import SESSIONS
-from ..settings import BAKE_SETTINGS
+from ..settings import BAKE_SETTINGS, named_settings
 from .rebound_panel import ReboundPanel, draw_settings
 
 # Rows that a basis has nothing to do with.
@@ -28,6 +28,7 @@ class REBOUND_PT_transfer(ReboundPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout, group = self.layout, context.scene.rebound
+        draw_settings(layout, group, [(name, s) for name, s in named_settings() if name.startswith("transfer_")])
         _draw_progress(layout, context.window_manager.rebound)
         row = layout.row(align=True)
         row.operator("rebound.bake_transfer", text="Bake Selected").objects = "SELECTED"

@@ -18,7 +18,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 position = texelFetch(position_tx, pixel, 0);
   out_light = vec4(0.0);
-  if (position.w <= 0.0) {
+  if (position.w <= 0.0 || (int(position.w) & HAS_SKY) != 0) {
     return;
   }
   vec4 normals = texelFetch(normal_tx, pixel, 0);

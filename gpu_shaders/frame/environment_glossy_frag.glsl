@@ -10,7 +10,8 @@ void main()
   vec4 position = texelFetch(position_tx, pixel, 0);
   vec4 specular = texelFetch(specular_tx, pixel, 0);
   out_light = vec4(0.0);
-  if (position.w <= 0.0 || specular.rgb == vec3(0.0)) {
+  bool has = (int(position.w) & HAS_SKY_MIRRORED) != 0;
+  if (position.w <= 0.0 || has || specular.rgb == vec3(0.0)) {
     return;
   }
   vec4 normals = texelFetch(normal_tx, pixel, 0);

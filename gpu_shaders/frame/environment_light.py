@@ -15,7 +15,7 @@ from ...device.interface import Device
 from ...device.shader import Shader
 from .draws import ADD
 from .environment import HARMONICS
-from .inputs import FrameInputs, LightTargets
+from .inputs import HAS_DEFINES, FrameInputs, LightTargets
 from .voxels import VOXEL_GRID, VOXEL_SAMPLERS, Voxels
 
 # Voxels along the longest side of the scene, and the stream of noise.
@@ -30,6 +30,7 @@ DIFFUSE = Shader(
     samplers=_SHARED,
     uniforms={"voxel_grid": VOXEL_GRID, "harmonics": HARMONICS},
     constants=_CONSTANTS,
+    defines=HAS_DEFINES,
 )
 GLOSSY = Shader(
     name="environment_glossy",
@@ -38,6 +39,7 @@ GLOSSY = Shader(
     samplers={**_SHARED, "specular_tx": "FLOAT_2D", "environment_tx": "FLOAT_2D"},
     uniforms={"voxel_grid": VOXEL_GRID},
     constants=_CONSTANTS,
+    defines=HAS_DEFINES,
 )
 SHADERS = (DIFFUSE, GLOSSY)
 

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from ...gpu_scene import GpuScene
 
 
+# Bits of the G-buffer's position.w, of pixels whose baked light (prt) has what no technique is to add again: the
+# light of the sky on the diffuse part; on the specular part as well; and the sky's light by way of surfaces.
+HAS_DEFINES = (("HAS_SKY", "2"), ("HAS_SKY_MIRRORED", "4"), ("HAS_SKY_BOUNCES", "8"))
+HAS_SKY, HAS_SKY_MIRRORED, HAS_SKY_BOUNCES = (int(number) for _, number in HAS_DEFINES)
+
 # Seeds that one use of noise may count on from its own, as many as two for each of 2048 lights; and uses in a frame.
 # With a frame's seed of up to 65535 all of them fit a shader's signed integer.
 SEEDS_A_STREAM, STREAMS = 1 << 12, 5
@@ -25,7 +30,8 @@ class GBuffer:
     """What the camera sees, one texel a pixel.
 
     ``albedo`` RGBA16F: diffuse reflectance; a: 1 surface, 0 background, -1 holdout. ``emission`` RGBA32F radiance.
-    ``position`` RGBA32F world position; w: 1 surface, -1 one that takes no indirect light, 0 background. ``normal``
+    ``position`` RGBA32F world position; w: 1 surface (plus bits of HAS_DEFINES), -1 one that takes no indirect light, 0
+    background. ``normal``
     RGBA32F: shading normal and geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F:
     specular reflectance at normal incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the
     square root of GGX's alpha.

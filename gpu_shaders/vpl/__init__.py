@@ -222,6 +222,7 @@ class Vpl:
             "face_tx": self.sources.face_table,
             "cache_index_tx": self._indices[CACHE].texture,
             "emitter_index_tx": self._indices[EMITTERS].texture,
+            "cache_sky_tx": self.cache.sky,
             **self.pool.bindings(),
             **self.voxels.bindings(),
             "vpl_frame": VPL_FRAME.pack([frame], for_uniform=True),

@@ -42,12 +42,20 @@ class Cache:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._sums: list[tuple[Texture, Target]] = []  # the newest first
+        # The newest first: light, the sky's part of it, both as a target.
+        self._sums: list[tuple[Texture, Texture, Target]] = []
         self._flux: tuple[Texture, Target] | None = None  # of the atlas
         self._next_row = 0
         self._revision = -1  # of the scene that was last gathered in
         self._updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
         self._counts = 1.0  # part of them that a mean is of
+
+    @property
+    def sky(self) -> Texture:
+        """Sum, and number, of the part of the points' light that came from the sky."""
+        if not self._sums:
+            self._allocate()
+        return self._sums[0][1]
 
     def plan(self, gpu_scene: GpuScene, *, many: bool, rows: int) -> tuple[int, int]:
         """How often to gather for this picture, and in how many of the points' rows: in ``rows``, but in all of them
@@ -97,16 +105,16 @@ class Cache:
             self._next_row = 0
         rows = min(rows, place[3] - self._next_row)
         self._sums.reverse()
-        (_, target), (old, _) = self._sums
+        (_, _, target), (old, old_sky, _) = self._sums
         most = ROUNDS * max(self._updates, 0.0) * self._counts
         span = (self._next_row, self._next_row + rows)
-        self.device.fullscreen(CACHE_FADE, target, sum_tx=old, pc_most=most, pc_rows=span)
+        self.device.fullscreen(CACHE_FADE, target, sum_tx=old, sky_tx=old_sky, pc_most=most, pc_rows=span)
         self.device.fullscreen(
             CACHE_GATHER[glossy],
             target,
             state=ADD,
             viewport=(0, self._next_row, place[2], rows),
-            **candidates,
+            **{**candidates, "cache_sky_tx": old_sky},
             pc_rounds=ROUNDS,
             pc_origin=place[:2],
         )
@@ -121,19 +129,20 @@ class Cache:
 
     def free(self) -> None:
         self._free_flux()
-        for texture, target in self._sums:
+        for texture, sky, target in self._sums:
             self.device.free(target)
             self.device.free(texture)
+            self.device.free(sky)
         self._sums.clear()
 
     def _allocate(self) -> None:
         for _ in range(2):
-            texture = self.device.texture((POINTS_SIDE, POINTS_SIDE), "RGBA32F")
-            self._sums.append((texture, self.device.target([texture])))
+            texture, sky = (self.device.texture((POINTS_SIDE, POINTS_SIDE), "RGBA32F") for _ in range(2))
+            self._sums.append((texture, sky, self.device.target([texture, sky])))
         self._clear()
 
     def _clear(self) -> None:
-        for _, target in self._sums:
+        for *_, target in self._sums:
             self.device.clear(target)
 
     def _free_flux(self) -> None:

@@ -1,6 +1,7 @@
 """Declarations of the passes of virtual point lights."""
 
 from ...device.shader import Shader
+from ..frame.inputs import HAS_DEFINES
 from ..frame.reflective_shaders import SOURCE_DEFINES
 from ..frame.structs import LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE
 from ..frame.voxels import VOXEL_GRID, VOXEL_SAMPLERS
@@ -103,6 +104,7 @@ _CANDIDATES = {
     "face_tx": "FLOAT_2D",
     "cache_index_tx": "FLOAT_2D",
     "emitter_index_tx": "FLOAT_2D",
+    "cache_sky_tx": "FLOAT_2D",
     **VOXEL_SAMPLERS,
 }
 
@@ -124,7 +126,7 @@ def _candidate_pass(
         uniforms={"voxel_grid": VOXEL_GRID, "vpl_frame": VPL_FRAME},
         structs=(TILE, LIGHT, MAP_FACE),
         constants=constants,
-        defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES, *defines),
+        defines=(*_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES, *HAS_DEFINES, *defines),
     )
 
 
@@ -331,15 +333,17 @@ INDEX_SPREAD = Shader(
 CACHE_FADE = Shader(
     name="vpl_cache_fade",
     fragment="vpl/vpl_cache_fade_frag.glsl",
-    outputs={"out_sum": "VEC4"},
-    samplers={"sum_tx": "FLOAT_2D"},
+    outputs={"out_sum": "VEC4", "out_sky": "VEC4"},
+    samplers={"sum_tx": "FLOAT_2D", "sky_tx": "FLOAT_2D"},
     constants={"pc_most": "FLOAT", "pc_rows": "IVEC2"},
 )
 
 
 def _cache_gather(name: str, *defines: tuple[str, str]) -> Shader:
     constants = {"pc_rounds": "INT", "pc_origin": "IVEC2"}
-    return _candidate_pass(name, "vpl/vpl_cache_gather_frag.glsl", ("out_sum",), ("position_tx",), constants, defines)
+    return _candidate_pass(
+        name, "vpl/vpl_cache_gather_frag.glsl", ("out_sum", "out_sky"), ("position_tx",), constants, defines
+    )
 
 
 CACHE_GATHER = {False: _cache_gather("vpl_cache_gather"), True: _cache_gather("vpl_cache_gather_glossy", _GLOSSY)}

@@ -1,4 +1,5 @@
-/* Some rounds of gathering at one point of the cache: irradiance / pi from the pool, and their number. */
+/* Some rounds of gathering at one point of the cache: irradiance / pi from the pool, and their number; and the
+ * part of it that came from the sky, which baked objects have already. */
 #include "vpl/vpl_candidates_lib.glsl"
 
 /* Where the points' noise begins, beyond any picture's pixels. */
@@ -9,6 +10,7 @@ void main()
   ivec2 point = ivec2(gl_FragCoord.xy);
   ivec2 texel = point + pc_origin;
   out_sum = vec4(0.0);
+  out_sky = vec4(0.0);
   vec4 place = texelFetch(position_area_tx, texel, 0);
   vec3 N = texelFetch(normal_kind_tx, texel, 0).xyz;
   if (place.w == 0.0) {
@@ -17,9 +19,14 @@ void main()
   for (int i = 0; i < pc_rounds; i++) {
     bool visible;
     vec3 carried;
+    vec3 from_sky;
     vec3 emitted;
-    Reservoir r = candidates_choose(place.xyz, N, N, N, point + CACHE_PIXEL, i, visible, carried, emitted);
+    Reservoir r = candidates_choose(place.xyz, N, N, N, point + CACHE_PIXEL, i, vpl_frame.kinds, visible, carried,
+                                    from_sky, emitted);
     vec3 light = candidates_light(r, visible, place.xyz, N, N, N);
-    out_sum += vec4(light + emitted + ((vpl_frame.kinds >> SOURCE_CACHE & 1) != 0 ? carried : vec3(0.0)), 1.0);
+    float further = float(vpl_frame.kinds >> SOURCE_CACHE & 1);
+    out_sum += vec4(light + emitted + further * carried, 1.0);
+    bool is_sky = r.id != 0 && vpl_id_kind(r.id) == SOURCE_SKY;
+    out_sky += vec4((is_sky ? light : vec3(0.0)) + further * from_sky, 1.0);
   }
 }

@@ -82,13 +82,14 @@ Vpl candidates_sky(vec3 direction)
   return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
 }
 
-/* Radiance that the cache holds for what a ray hit after `far`: that of the point whose plane the hit lies on best, out of
+/* Radiance that the cache holds for what a ray hit after `far`, and the part of it that came from the sky: that of the point whose plane the hit lies on best, out of
  * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
  * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, it is not `known`:
  * what is hidden is never believed, or light would pass walls. */
-vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out bool known)
+vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out bool known, out vec3 from_sky)
 {
   known = true;
+  from_sky = vec3(0.0);
   float edge = voxel_edge_at(hit);
   vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
   for (int attempt = 0; attempt < CANDIDATES_ATTEMPTS && vpl_frame.cache.z > 0.0; attempt++) {
@@ -114,6 +115,8 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out boo
     }
     vec3 n = texelFetch(normal_kind_tx, best, 0).xyz;
     if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, best, 0).xyz, n))) {
+      vec4 sum = texelFetch(cache_sky_tx, best - ivec2(vpl_frame.cache.xy), 0);
+      from_sky = sum.rgb / max(sum.w, 1.0) * texelFetch(specular_tx, best, 0).rgb; /* the cache's reflectance */
       return index_radiance(position_area_tx, flux_tx, best);
     }
   }
@@ -164,30 +167,32 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
 /* Radiance that the cache holds for a receiver's ray. Where no point answers for its hit, another ray's stands in: what is
  * not known is taken for the mean of what the receiver sees, not for black, and still nothing passes a wall. */
 vec3 candidates_bounced(vec3 origin, vec3 N, vec3 geometric, vec2 noise, vec3 hit, vec3 direction, float far,
-                        vec3 cell_noise)
+                        vec3 cell_noise, out vec3 from_sky)
 {
   bool known;
-  vec3 carried = candidates_carried(hit, direction, far, cell_noise, known);
+  vec3 carried = candidates_carried(hit, direction, far, cell_noise, known, from_sky);
   for (int i = 1; i <= CANDIDATES_AGAIN && !known && vpl_frame.cache.z > 0.0; i++) {
     vec3 other = candidates_cosine_direction(N, fract(noise + float(i) * CANDIDATES_TURN));
     float other_far = dot(other, geometric) > 0.0 ? voxel_trace(origin, other, 1e30) : -1.0;
     if (other_far >= 0.0) {
       vec3 other_hit = origin + (other_far + 0.5 * voxel_grid.edge) * other;
-      carried = candidates_carried(other_hit, other, other_far, cell_noise, known);
+      carried = candidates_carried(other_hit, other, other_far, cell_noise, known, from_sky);
     }
   }
   return carried;
 }
 
-/* Fill a reservoir for the surface at P. `visible`: the chosen one is known to be seen from it. `carried` and
- * `emitted` are one ray's estimates of the irradiance / pi from the cache, and of the part of that from emitters. Receivers and their
- * rounds, of the same sample, differ in `pixel` or in `round`. */
-Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec2 pixel, int round, out bool visible,
-                            out vec3 carried, out vec3 emitted)
+/* Fill a reservoir for the surface at P from lights of `kinds`, bits of SourceKind. `visible`: the chosen one is known to
+ * be seen from it. `carried` and `emitted` are one ray's estimates of the irradiance / pi from the cache, and from emitters;
+ * `from_sky` the part of `carried` that came from the sky. Receivers and their rounds, of the same sample, differ in
+ * `pixel` or in `round`. */
+Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec2 pixel, int round, int kinds,
+                            out bool visible, out vec3 carried, out vec3 from_sky, out vec3 emitted)
 {
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
   visible = false;
   carried = vec3(0.0);
+  from_sky = vec3(0.0);
   emitted = vec3(0.0);
   int count = vpl_frame.candidates;
   int seed = vpl_frame.seed + 4 * round;
@@ -200,7 +205,7 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
     ivec2 at = ivec2(entry % VPL_POOL_ROW, entry / VPL_POOL_ROW);
     vec4 facing = texelFetch(pool_normal_tx, at, 0);
     int id = floatBitsToInt(facing.w);
-    if ((vpl_frame.kinds >> vpl_id_kind(id) & 1) == 0) {
+    if ((kinds >> vpl_id_kind(id) & 1) == 0) {
       continue;
     }
     vec4 flux = texelFetch(pool_flux_tx, at, 0);
@@ -230,12 +235,12 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
       vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
       emitted = candidates_emitted(P, N, hit, direction);
       vec3 cell_noise = vec3(sampling_hash(pixel, seed + 3), choice.y);
-      carried = candidates_bounced(origin, N, geometric, noise, hit, direction, far, cell_noise);
-      int tile = (vpl_frame.kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
+      carried = candidates_bounced(origin, N, geometric, noise, hit, direction, far, cell_noise, from_sky);
+      int tile = (kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
       if (tile >= 0) {
         seen = candidates_seen(hit, direction, tile, seen_tile);
       }
-    } else if (vpl_frame.sky.z > 0.0) {
+    } else if (vpl_frame.sky.z > 0.0 && (kinds >> SOURCE_SKY & 1) != 0) {
       seen = candidates_sky(direction);
       seen_tile = vpl_frame.sky_tile;
     }

@@ -22,8 +22,12 @@ void main()
   vec3 seen_from = math_toward(P, vpl_frame.eye);
   bool visible;
   vec3 carried;
+  vec3 from_sky;
   vec3 emitted;
-  Reservoir r = candidates_choose(P, N, geometric, seen_from, pixel, 0, visible, carried, emitted);
+  int has = int(position.w);
+  int kinds = (has & HAS_SKY) != 0 ? vpl_frame.kinds & ~(1 << SOURCE_SKY) : vpl_frame.kinds;
+  Reservoir r = candidates_choose(P, N, geometric, seen_from, pixel, 0, kinds, visible, carried, from_sky, emitted);
+  carried -= (has & HAS_SKY_BOUNCES) != 0 ? from_sky : vec3(0.0);
   vec3 light = candidates_light(r, visible, P, N, geometric, seen_from);
   out_surface = surface_pack(P, N);
 #ifdef BOUND_VIEW

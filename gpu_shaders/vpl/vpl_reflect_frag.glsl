@@ -33,9 +33,11 @@ void main()
   out_surface = vec4(0.0);
   out_indirect = vec4(0.0);
   out_direct = vec4(0.0);
-  vec3 P = texelFetch(position_tx, pixel, 0).xyz;
+  vec4 position = texelFetch(position_tx, pixel, 0);
+  vec3 P = position.xyz;
+  int has = int(position.w);
   vec4 specular = texelFetch(specular_color_tx, pixel, 0);
-  if (texelFetch(position_tx, pixel, 0).w <= 0.0 || specular.rgb == vec3(0.0)) {
+  if (position.w <= 0.0 || specular.rgb == vec3(0.0)) {
     return;
   }
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
@@ -55,7 +57,7 @@ void main()
   vec3 origin = voxel_start_seen(P, geometric, V);
   float far = voxel_trace(origin, direction, 1e30);
   if (far < 0.0) {
-    if (vpl_frame.mirrored != 0) {
+    if (vpl_frame.mirrored != 0 && (has & HAS_SKY_MIRRORED) == 0) {
       float density = bxdf_sample_density(N, V, direction, specular.a);
       float level = environment_level_of_ray(environment_tx, density, vpl_frame.number);
       out_direct = vec4(weight * environment_radiance(environment_tx, direction, level), 1.0);
@@ -69,7 +71,10 @@ void main()
   }
   vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
   bool known;
-  vec3 light = candidates_carried(hit, direction, far, vec3(sampling_hash(pixel, seed + 2), choice.y), known);
+  vec3 from_sky;
+  vec3 cell_noise = vec3(sampling_hash(pixel, seed + 2), choice.y);
+  vec3 light = candidates_carried(hit, direction, far, cell_noise, known, from_sky);
+  light -= (has & HAS_SKY_MIRRORED) != 0 && (has & HAS_SKY_BOUNCES) != 0 ? from_sky : vec3(0.0);
   light += reflect_lamps(hit, direction, choice.x);
   out_indirect.rgb = weight * light;
 }

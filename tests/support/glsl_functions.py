@@ -20,6 +20,7 @@ def evaluate(
     *,
     tables=(),
     textures=(),
+    files: Mapping[str, str] | None = None,
     **given,
 ) -> np.ndarray:
     """``expression``, a vec4, for every row of ``inputs``: (n, 4) float64.
@@ -48,7 +49,7 @@ def evaluate(
     shader = Shader(
         "evaluate",
         fragment=path,
-        files={path: text},
+        files={**(files or {}), path: text},
         outputs={"out_value": "VEC4"},
         samplers=dict.fromkeys(sent, "FLOAT_2D"),
         structs=tuple(tables),

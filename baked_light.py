@@ -1,0 +1,107 @@
+"""The light of baked objects in a picture: their bakes' answers (bake/live.py) for the passes (gpu_shaders/prt)."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+
+from .bake import lobes
+from .bake.light import Surroundings
+from .bake.live import Live, make_live
+from .bake.surfaces import frame_of, mesh_vertices
+from .device.interface import Device
+from .gpu_scene import GpuScene
+from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
+from .gpu_shaders.prt import BakedObject, BakedObjects
+from .gpu_shaders.prt.shaders import LOBES_SIDE
+from .scene.data import Instance, Scene, Visibility, World
+from .settings import Settings
+
+_BANDS = 6  # that the shader knows
+_SEEN = Visibility.CAMERA
+_NOT_LIT = Visibility.HOLDOUT | Visibility.NO_INDIRECT
+
+
+class BakedLight:
+    """Bakes of one renderer; ``updates`` counts answers worked out, for the reactivity tests."""
+
+    def __init__(self, device: Device) -> None:
+        self.updates = 0
+        self._objects = BakedObjects(device)
+        self._live: dict[Hashable, Live] = {}
+        self._answered: dict[Hashable, tuple] = {}  # by Instance.key: what its light was worked out for
+        self._surroundings = Surroundings(np.zeros(3))
+        self._world: World | None = None
+        self._drawn: list[BakedObject] = []
+        self._up_to_date: tuple = ()
+
+    def update(self, gpu_scene: GpuScene, settings: Settings) -> bool:
+        """Work out what has changed of the objects' light; whether there is any to draw."""
+        wanted = settings.of("transfer")
+        key = (gpu_scene.scene, gpu_scene.revision, wanted)
+        if self._up_to_date == key:
+            return bool(self._drawn)
+        self._up_to_date = key
+        scene = gpu_scene.scene
+        lit = [i for i in scene.instances if i.transfer is not None and _is_lit(i)] if wanted["use"] else []
+        if self._world != scene.world:
+            self._world, self._surroundings = scene.world, Surroundings(np.array(scene.world.color))
+            self._answered.clear()
+        self._drawn = [self._object(scene, instance, wanted) for instance in lit]
+        self._forget(lit)
+        return bool(self._drawn)
+
+    def draw(self, inputs: FrameInputs, targets: LightTargets, *, glossy: bool) -> None:
+        """Add it to the direct targets, and mark its pixels for the techniques."""
+        self._objects.draw(inputs, self._drawn, targets, glossy=glossy)
+
+    def free(self) -> None:
+        self._objects.free()
+        self._live.clear()
+        self._answered.clear()
+        self._drawn, self._up_to_date = [], ()
+
+    def _object(self, scene: Scene, instance: Instance, settings: Mapping[str, Any]) -> BakedObject:
+        mesh, frame = scene.meshes[instance.mesh], frame_of(instance.world_from_object)
+        if not self._objects.has_mesh(mesh.key):
+            self._objects.add_mesh(mesh.key, mesh.positions, mesh_vertices(mesh)[1])
+        if instance.transfer not in self._live:
+            self._live[instance.transfer] = make_live(scene.transfers[instance.transfer])
+        live = self._live[instance.transfer]
+        if live.coefficients > 1 and not self._objects.has_lobes:
+            self._objects.set_lobes(lobe_table())
+        question = (instance.transfer, frame.tobytes(), *(settings[name] for name in ("bands", "window", "terms")))
+        if self._answered.get(instance.key) != question:
+            answer = live.answer(
+                self._surroundings, frame, int(settings["bands"]), float(settings["window"]), int(settings["terms"])
+            )
+            self._objects.set_light(instance.key, answer)
+            self._answered[instance.key] = question
+            self.updates += 1
+        place = (mesh.key, instance.key, instance.world_from_object, frame)
+        return self._objects.object(*place, bounces=live.bounces)
+
+    def _forget(self, lit: list[Instance]) -> None:
+        """Give back what is no longer drawn."""
+        keys, transfers = {i.key for i in lit}, {i.transfer for i in lit}
+        self._objects.keep({i.mesh for i in lit}, keys)
+        self._answered = {key: question for key, question in self._answered.items() if key in keys}
+        self._live = {key: live for key, live in self._live.items() if key in transfers}
+
+
+def _is_lit(instance: Instance) -> bool:
+    return bool(instance.visibility & _SEEN) and not instance.visibility & _NOT_LIT
+
+
+def lobe_table() -> np.ndarray:
+    """(cosines, 2 roughnesses, 4): what prt_glossy_frag.glsl reads of a GGX lobe, two texels a roughness."""
+    table = np.zeros((LOBES_SIDE, LOBES_SIDE, 8))
+    steps = np.linspace(0.0, 1.0, LOBES_SIDE)
+    for row, cosine in enumerate(steps):
+        for column, roughness in enumerate(steps):
+            lobe, axis = lobes.ggx_seen(_BANDS, roughness, cosine)
+            table[row, column, 0] = axis
+            table[row, column, 1:_BANDS] = (lobes.band_scales(_BANDS) * lobe)[1:]
+    return table.reshape(LOBES_SIDE, 2 * LOBES_SIDE, 4)

@@ -1,0 +1,159 @@
+"""What baked objects pass on of the light of their surroundings, drawn over the G-buffer.
+
+P.-P. Sloan, J. Kautz, J. Snyder, "Precomputed Radiance Transfer", SIGGRAPH 2002; R. Ng, R. Ramamoorthi, P. Hanrahan,
+"All-Frequency Shadows Using Non-linear Wavelet Lighting Approximation", SIGGRAPH 2003.
+
+1. The light of the vertices comes from ``bake.live``, by products of matrices, whenever the surroundings or their
+   rotation change: irradiance / pi, or harmonics of the arriving radiance.
+2. The objects are drawn again where the G-buffer has them. A pixel mixes its vertices' light; harmonics are convolved
+   with the cosine and with the material's lobe there.
+3. What was drawn is added to the direct light. The G-buffer's position is marked, so that no technique adds the sky.
+
+Limits: docs/prt.md. Between the vertices light is mixed, so it is as fine as the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...device.interface import Device, DrawState, Target, Texture, Vertices
+from ..frame.draws import ADD
+from ..frame.inputs import HAS_SKY, HAS_SKY_BOUNCES, HAS_SKY_MIRRORED, FrameInputs, LightTargets
+from ..frame.shaders import RESOLVE
+from .shaders import DRAW, PRT_DRAW, SHADERS
+
+__all__ = ["SHADERS", "BakedObject", "BakedObjects"]
+
+# Texels in a row of a texture of vertices.
+ROW_TEXELS = 2048
+OVER_GBUFFER = DrawState(depth_test="LESS_EQUAL")
+
+
+@dataclass(eq=False)
+class BakedObject:
+    """One object's mesh by corners and the light of its vertices."""
+
+    world_from_object: np.ndarray  # (4, 4)
+    frame: np.ndarray  # (3, 3): the axes of the bake in the world
+    vertices: Vertices
+    light: Texture
+    coefficients: int  # of the arriving radiance; 1: irradiance / pi
+    texels: int  # of one vertex
+    has: int  # HAS_... bits of frame.inputs
+
+
+class BakedObjects:
+    """The passes and what they keep on the GPU. Meshes and lights are told by name, and given back when not told."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._meshes: dict[Hashable, Vertices] = {}
+        self._lights: dict[Hashable, tuple[Texture, int, int]] = {}
+        self._lobes: Texture | None = None
+        self._pictures: Target | None = None  # diffuse, glossy
+        self._target: Target | None = None  # the G-buffer's position, and those
+        self._over: Texture | None = None  # that position
+
+    def has_mesh(self, key: Hashable) -> bool:
+        return key in self._meshes
+
+    def add_mesh(self, key: Hashable, positions: np.ndarray, vertices: np.ndarray) -> None:
+        """(3T, 3) corners, and the vertex of each (3T,)."""
+        triangles = np.repeat(vertices.reshape(-1, 3).astype(np.int32), 3, axis=0)
+        self._meshes[key] = self.device.vertices({"in_position": positions, "in_triangle": triangles})
+
+    def set_light(self, key: Hashable, light: np.ndarray) -> None:
+        """(vertices, coefficients, 3) float32 of one object."""
+        count, coefficients, _ = light.shape
+        texels = 1 if coefficients == 1 else -(-3 * coefficients // 4)
+        row = ROW_TEXELS // texels
+        height = -(-count // row)
+        filled = np.zeros((height * row, 4 * texels), np.float32)
+        filled[:count, : 3 * coefficients] = light.reshape(count, -1)
+        if key in self._lights:
+            self.device.free(self._lights[key][0])
+        data = filled.reshape(height, row * texels, 4)
+        self._lights[key] = (self.device.texture((row * texels, height), "RGBA32F", data), coefficients, texels)
+
+    def set_lobes(self, table: np.ndarray) -> None:
+        """(cosines, 2 roughnesses, 4) of PRT_LOBES a side: see prt_lobe() in prt_glossy_frag.glsl."""
+        self._lobes = self.device.texture((table.shape[1], table.shape[0]), "RGBA32F", table.astype(np.float32))
+
+    @property
+    def has_lobes(self) -> bool:
+        return self._lobes is not None
+
+    def object(
+        self, mesh: Hashable, light: Hashable, world_from_object: np.ndarray, frame: np.ndarray, *, bounces: bool
+    ) -> BakedObject:
+        """Of a mesh and a light that were told before. ``bounces``: whether the bake has light that bounced."""
+        texture, coefficients, texels = self._lights[light]
+        has = HAS_SKY | HAS_SKY_MIRRORED * (coefficients > 1) | HAS_SKY_BOUNCES * bounces
+        return BakedObject(world_from_object, frame, self._meshes[mesh], texture, coefficients, texels, has)
+
+    def keep(self, meshes: set[Hashable], lights: set[Hashable]) -> None:
+        """Give everything else back."""
+        for key in self._meshes.keys() - meshes:
+            self.device.free(self._meshes.pop(key))
+        for key in self._lights.keys() - lights:
+            self.device.free(self._lights.pop(key)[0])
+
+    def draw(self, inputs: FrameInputs, objects: list[BakedObject], targets: LightTargets, *, glossy: bool) -> None:
+        """Add the objects' light to the direct targets, and mark their pixels in the G-buffer's position."""
+        pictures, over = self._targets(inputs)
+        self.device.clear(pictures)
+        for one in objects:
+            is_full = one.coefficients > 1
+            rotation = np.eye(4)
+            rotation[:3, :3] = one.frame.T
+            block = {
+                "clip_from_world": inputs.clip_from_world,
+                "world_from_object": one.world_from_object,
+                "local_from_world": rotation,
+                "eye": inputs.eye,
+                "has": one.has,
+                "row": ROW_TEXELS // one.texels,
+                "texels": one.texels,
+                "coefficients": one.coefficients,
+            }
+            looks = {"normal_tx": inputs.gbuffer.normal, "specular_tx": inputs.gbuffer.specular, "lobe_tx": self._lobes}
+            self.device.draw(
+                DRAW[is_full],
+                one.vertices,
+                over,
+                state=OVER_GBUFFER,
+                light_tx=one.light,
+                prt_draw=PRT_DRAW.pack([block], for_uniform=True),
+                **(looks if is_full else {}),
+            )
+        diffuse, mirrored = pictures.colors
+        self.device.fullscreen(RESOLVE, targets.diffuse_direct, state=ADD, sum_tx=diffuse, pc_weight=1.0)
+        if glossy:
+            self.device.fullscreen(RESOLVE, targets.glossy_direct, state=ADD, sum_tx=mirrored, pc_weight=1.0)
+
+    def free(self) -> None:
+        self.keep(set(), set())
+        self._free_targets()
+        self.device.free(self._lobes)
+        self._lobes = None
+
+    def _targets(self, inputs: FrameInputs) -> tuple[Target, Target]:
+        position = inputs.gbuffer.position
+        if self._pictures is None or self._target is None or self._over is not position:
+            self._free_targets()
+            size = position.size
+            self._pictures = self.device.target([self.device.texture(size, "RGBA32F") for _ in range(2)])
+            self._target = self.device.target([position, *self._pictures.colors], inputs.gbuffer.depth)
+            self._over = position
+        return self._pictures, self._target
+
+    def _free_targets(self) -> None:
+        self.device.free(self._target)
+        if self._pictures is not None:
+            self.device.free(self._pictures)
+            for texture in self._pictures.colors:
+                self.device.free(texture)
+        self._pictures = self._target = self._over = None

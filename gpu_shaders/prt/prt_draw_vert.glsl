@@ -1,0 +1,15 @@
+/* A baked object again, where the G-buffer has it: one light a vertex, or the vertices to mix for a pixel. */
+void main()
+{
+  vec4 world = prt_draw.world_from_object * vec4(in_position, 1.0);
+  v_position = world.xyz;
+  gl_Position = prt_draw.clip_from_world * world;
+  int corner = gl_VertexID % 3;
+#ifdef GLOSSY
+  v_triangle = ivec4(in_triangle, 0);
+  v_weights = vec3(corner == 0, corner == 1, corner == 2);
+#else
+  int vertex = in_triangle[corner];
+  v_light = texelFetch(light_tx, ivec2(vertex % prt_draw.row, vertex / prt_draw.row), 0).rgb;
+#endif
+}

@@ -1,0 +1,163 @@
+"""Baked objects in the picture: closed forms, nothing lit twice, and what is worked out again after an edit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rebound.bake import sh
+from rebound.bake.job import BakeSettings, Kind
+from rebound.scene.data import Material, Visibility, World
+from rebound.tests.support.bake_scenes import grid
+from rebound.tests.support.baked_scenes import baked
+from rebound.tests.support.glsl_functions import evaluate
+from rebound.tests.support.render_scenes import EVERYTHING, Studio, light, ortho, perspective, place, scene, sphere
+
+SKY = World((1.0, 0.8, 0.5))
+VIEW = perspective(48, 36, 50, (0, -3.2, 1.6), (0, 0, 0.5))
+QUICK = BakeSettings(directions=512, bounces=2)
+
+
+@pytest.fixture(scope="module")
+def studio(headless_device):
+    studio = Studio(headless_device)
+    yield studio
+    studio.free()
+
+
+def ball_on_floor(**fields):
+    return scene([grid("floor", 4.0, 24), sphere("ball", (0, 0, 0.6), 0.5)], world=SKY, **fields)
+
+
+BAKED = baked(ball_on_floor(), QUICK)
+
+
+def picture(studio, shown, samples=4, view=VIEW, **changed):
+    return studio.render(shown, view, samples, **{"method": "NONE", **changed})["combined"][..., :3]
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_ball_alone_under_a_white_sky_is_its_own_colour(studio, kind):
+    """Within half a percent: what compression and 16 bits are allowed."""
+    alone = scene([sphere("ball", (0, 0, 0), 0.5, rings=24)], albedo=0.8, world=World((1.0, 1.0, 1.0)))
+    shown = baked(alone, replace(QUICK, kind=kind, error=0.002, keep=0.9999))
+    found = studio.render(shown, ortho(24, 24, 1.2), 1, ("diffuse_direct", "diffuse_color"), method="NONE")
+    on_it = found["diffuse_color"][..., 0] > 0.79
+    assert on_it.sum() > 300
+    np.testing.assert_allclose(found["diffuse_direct"][on_it], 1.0, atol=0.005)
+
+
+def surface(studio, shown=BAKED):
+    """(h, w) bool: pixels that show nothing but surface."""
+    return studio.render(shown, VIEW, 4, ("diffuse_color",), method="NONE")["diffuse_color"][..., 0] > 0.79
+
+
+def unbaked(shown, *keys):
+    """The scene with these objects' bakes taken off, by default all."""
+    keep = [i if keys and i.key not in keys else replace(i, transfer=None) for i in shown.instances]
+    return replace(shown, instances=tuple(keep))
+
+
+def test_baked_light_is_the_live_light(studio):
+    """The sky by rays and by the cache, noisy and a little blurred, against the bake."""
+    live = picture(studio, unbaked(BAKED), 32, method="VPL", vpl_bounces="MANY")
+    found, where = picture(studio, BAKED), surface(studio)
+    assert found[where].mean() == pytest.approx(live[where].mean(), rel=0.02)
+    assert np.abs(found - live)[where].mean() / live[where].mean() < 0.06
+
+
+@pytest.mark.parametrize("method", ["VPL", "RSM"])
+def test_no_technique_lights_baked_objects_twice(studio, method):
+    """Virtual lights have patches of the sky, and the cache its bounces: the bake has all of that already."""
+    found = picture(studio, BAKED, 2, method=method, vpl_bounces="MANY")
+    np.testing.assert_allclose(found, picture(studio, BAKED, 2), atol=1e-5)
+
+
+@pytest.mark.parametrize("bounces", [0, 2])
+def test_objects_without_a_bake_keep_their_live_light(studio, bounces):
+    """The ball is baked, the floor is not: each has the light that it has where both are alike. A bake of shadows alone
+    leaves the sky's bounces to the cache.
+    """
+    shown = unbaked(baked(ball_on_floor(), replace(QUICK, bounces=bounces)), "floor")
+    live = picture(studio, unbaked(BAKED), 32, method="VPL", vpl_bounces="MANY")
+    found, where = picture(studio, shown, 32, method="VPL", vpl_bounces="MANY"), surface(studio)
+    assert found[where].mean() == pytest.approx(live[where].mean(), rel=0.02)
+    ball = where & (studio.render(BAKED, VIEW, 1, ("position",))["position"][..., 2] > 0.2)
+    assert found[ball].mean() == pytest.approx(live[ball].mean(), rel=0.03)
+
+
+def test_lamps_and_their_bounce_add_on_top(studio):
+    lamp = light("SPOT", (1.0, -1.0, 3.0), (0, 0, 0), 200.0)
+    dark, lit = (replace(BAKED, world=world, lights=(lamp,)) for world in (World(), SKY))
+    settings = {"method": "VPL", "vpl_bounces": "ONE"}
+    lamps = picture(studio, dark, 4, **settings)
+    both = picture(studio, lit, 4, **settings)
+    where, sky = surface(studio), picture(studio, BAKED)
+    # A few of the pool's entries stand for the sky, so that the lamp's bounce has another noise.
+    assert (both - lamps)[where].mean() == pytest.approx(sky[where].mean(), rel=2e-3)
+    np.testing.assert_allclose((both - lamps)[where], sky[where], atol=0.06)
+
+
+def test_mirror_of_a_white_sky_is_white(studio):
+    """A rough metal ball, alone: all that it reflects is sky."""
+    metal = Material("Metal", (1.0, 1.0, 1.0), metallic=1.0, roughness=0.6)
+    alone = scene([sphere("ball", (0, 0, 0), 0.5, rings=24)], materials=[metal], world=World((1.0, 1.0, 1.0)))
+    shown = baked(alone, replace(QUICK, kind=Kind.GLOSSY, bands=6, result_bands=6, error=0.002))
+    view = ortho(32, 32, 1.2)
+    found = studio.render(shown, view, 1, ("glossy_direct", "glossy_color"), method="NONE")
+    middle = np.hypot(*(np.mgrid[:32, :32] - 15.5)) < 10
+    # Beside the rim the lobe is cut by the horizon, which six bands blur: to 0.9.
+    np.testing.assert_allclose(found["glossy_direct"][middle], 1.0, atol=0.06)
+    assert found["glossy_direct"][middle].mean() == pytest.approx(1.0, abs=0.03)
+
+
+def test_objects_that_take_no_indirect_light_take_no_baked_one(studio):
+    alone = {"ball": EVERYTHING | Visibility.NO_INDIRECT, "floor": EVERYTHING | Visibility.NO_INDIRECT}
+    instances = tuple(replace(i, visibility=alone[i.key]) for i in BAKED.instances)
+    assert picture(studio, replace(BAKED, instances=instances))[surface(studio)].max() == 0.0
+    assert picture(studio, BAKED, transfer_use=False)[surface(studio)].max() == 0.0
+
+
+# --- what is worked out again -----------------------------------------------------------------------------------------
+
+
+def updates(studio, shown, view=VIEW, **changed):
+    before = studio.renderer.statistics()["baked_updates"]
+    studio.gpu_scene.uploads.clear()
+    picture(studio, shown, 1, view, **changed)
+    return studio.renderer.statistics()["baked_updates"] - before, dict(studio.gpu_scene.uploads)
+
+
+def test_only_another_light_or_turn_is_worked_out_again(studio):
+    updates(studio, BAKED)
+    assert updates(studio, BAKED) == (0, {})
+    assert updates(studio, BAKED, perspective(48, 36, 50, (2, -3.2, 1.6), (0, 0, 0.5))) == (0, {})
+    assert updates(studio, replace(BAKED, world=World((0.1, 0.2, 0.9)))) == (2, {})
+    assert updates(studio, BAKED)[0] == 2
+    assert updates(studio, BAKED, transfer_bands=3)[0] == 2
+    moved = {i.key: i.world_from_object + 0.5 * np.eye(4, k=3) for i in BAKED.instances}
+    away = replace(BAKED, instances=tuple(replace(i, world_from_object=moved[i.key]) for i in BAKED.instances))
+    assert updates(studio, away, transfer_bands=3)[0] == 0, "without a turn the light is the same"
+
+
+def test_turned_objects_have_the_light_of_the_world(studio):
+    """All turned together under a constant sky, and seen from the turned place: the same picture."""
+    turn = place((0.3, 0.2, 0.1), np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0])
+    turn[:3, 0] *= np.linalg.det(turn[:3, :3])
+    instances = tuple(replace(i, world_from_object=turn @ i.world_from_object) for i in BAKED.instances)
+    view = replace(VIEW, view_from_world=VIEW.view_from_world @ np.linalg.inv(turn))
+    np.testing.assert_allclose(
+        picture(studio, replace(BAKED, instances=instances), 1, view), picture(studio, BAKED, 1), atol=0.02
+    )
+
+
+def test_harmonics_of_the_shader_are_those_of_the_bake(headless_device):
+    directions = np.random.default_rng(4).normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    wanted = sh.evaluate(directions, 6)
+    path, numbers = "test/sh_at_lib.glsl", ", ".join(f"y[n + {i}]" for i in range(4))
+    text = "vec4 at(vec3 d, int n)\n{\n  float y[SH_MOST];\n  sh_evaluate(d, y);\n"
+    library = {path: f'#include "lib/sh_lib.glsl"\n{text}  return vec4({numbers});\n}}\n'}
+    for first in range(0, 36, 4):
+        found = evaluate(headless_device, [path], f"at(d.xyz, {first})", {"d": directions}, files=library)
+        np.testing.assert_allclose(found, wanted[:, first : first + 4], atol=2e-6)

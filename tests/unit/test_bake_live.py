@@ -1,0 +1,163 @@
+"""What a bake shows under a light: the quick answers against products written out, and projections of surroundings."""
+
+import numpy as np
+import pytest
+
+from rebound.bake import haar, lobes, sh
+from rebound.bake.file import Bake
+from rebound.bake.job import BakeSettings, Kind, bake_objects, glossy_matrices, wavelet_rows
+from rebound.bake.light import Surroundings
+from rebound.bake.live import make_live
+from rebound.bake.sphere import cube_directions, equirect_directions, quadrature, texel_of
+from rebound.bake.surfaces import frame_of
+from rebound.bake.transfer import finish
+from rebound.scene.data import Transfer
+from rebound.tests.support.bake_scenes import grid, placed
+from rebound.tests.support.render_scenes import place, sphere
+
+TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+TURN *= np.linalg.det(TURN)
+
+
+def scene():
+    matrices = [np.eye(4), place((0, 0, 0.7), TURN)]
+    return placed(
+        grid("floor", 3.0, 6), sphere("ball", (0, 0, 0), 0.5, rings=8), albedo=(0.8, 0.5, 0.3), matrices=matrices
+    )
+
+
+def transfer(kind, **settings):
+    """The ball's bake."""
+    made = BakeSettings(kind=kind, directions=256, bounces=1, rays="numpy", **settings)
+    bake = finish(bake_objects(scene(), ["ball"], made))["ball"]
+    return Transfer("ball", bake.about, bake.arrays)
+
+
+def picture(height=32):
+    """Surroundings with a bright side and a small lamp."""
+    d = equirect_directions(height, 2 * height)
+    radiance = 0.4 + 0.3 * d[..., 2] + 6.0 * (d @ [0.6, 0.0, 0.8] > 0.97)
+    return radiance[..., None] * [1.0, 0.8, 0.5]
+
+
+def answer(live, light, frame=TURN, bands=11, window=0.0, terms=100000):
+    return live.answer(light, frame, bands, window, terms)
+
+
+def test_diffuse_is_the_product_with_the_turned_light():
+    baked, light = transfer(Kind.DIFFUSE), Surroundings(picture())
+    found = answer(make_live(baked), light)[:, 0]
+    local = sh.rotate(light.harmonics(5), TURN.T)
+    right = np.einsum("vcl,cl->vc", baked.arrays["diffuse"].astype(np.float64), local)
+    np.testing.assert_allclose(found, right, atol=1e-5)
+    fewer = answer(make_live(baked), light, bands=2)[:, 0]
+    np.testing.assert_allclose(
+        fewer, np.einsum("vcl,cl->vc", baked.arrays["diffuse"][..., :4], local[:, :4]), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("error", [0.0, 0.05])
+def test_glossy_is_the_matrix_times_the_turned_light(error):
+    baked, light = transfer(Kind.GLOSSY, bands=4, result_bands=3, error=error), Surroundings(picture())
+    matrices = glossy_matrices(Bake(baked.about, baked.arrays)).rows().reshape(-1, *baked.about["matrix"])
+    right = np.einsum("vcrl,cl->vrc", matrices, sh.rotate(light.harmonics(4), TURN.T))
+    live = make_live(baked)
+    assert live.coefficients == 9
+    np.testing.assert_allclose(answer(live, light), right, atol=1e-4)
+    none_above = sh.rotate(light.harmonics(2), TURN.T)
+    np.testing.assert_allclose(
+        answer(live, light, bands=2), np.einsum("vcrl,cl->vrc", matrices[..., :4], none_above), atol=1e-4
+    )
+
+
+def test_wavelets_are_the_sparse_product_and_few_terms_come_near():
+    baked, light = transfer(Kind.WAVELET, texels=16, keep=1.0, bands=3), Surroundings(picture())
+    rows = wavelet_rows(Bake(baked.about, baked.arrays))
+    cube = light.cube(16, TURN)
+    right = rows.dot(haar.forward(np.moveaxis(cube, -1, 0)).reshape(3, -1).T)
+    local = sh.rotate(light.harmonics(3), TURN.T)
+    right += np.einsum("vcl,cl->vc", baked.arrays["bounced"].astype(np.float64), local)
+    live = make_live(baked)
+    np.testing.assert_allclose(answer(live, light)[:, 0], right, atol=1e-4)
+    errors = [np.abs(answer(live, light, terms=n)[:, 0] - right).mean() / right.mean() for n in (8, 64, 512)]
+    assert errors[0] > errors[1] > errors[2] and errors[2] < 0.01
+
+
+def test_black_surroundings_give_black():
+    for kind in Kind:
+        live = make_live(transfer(kind, texels=8))
+        assert not answer(live, Surroundings(np.zeros(3))).any()
+
+
+# --- surroundings ----------------------------------------------------------------------------------------------------
+
+
+def test_one_colour_is_a_constant_picture():
+    color = np.array([0.2, 0.5, 1.0])
+    one, many = Surroundings(color), Surroundings(np.broadcast_to(color, (16, 32, 3)))
+    np.testing.assert_allclose(one.harmonics(5), many.harmonics(5), atol=0.02)  # by the middles of 512 pixels
+    np.testing.assert_allclose(one.cube(8, TURN), many.cube(8, TURN), atol=1e-12)
+
+
+@pytest.mark.parametrize("height", [512, 500, 300])
+def test_large_pictures_are_made_smaller_and_keep_their_light(height):
+    image = picture(height)
+    np.testing.assert_allclose(Surroundings(image).harmonics(4), sh.project_equirect(image, 4), atol=5e-3)
+
+
+def test_window_takes_rings_away_and_no_light():
+    light = Surroundings(picture())
+    plain, smooth = light.harmonics(6), light.harmonics(6, 0.5)
+    np.testing.assert_array_equal(plain[:, 0], smooth[:, 0])
+    around = sh.evaluate(_directions(4000), 6)
+    assert (around @ smooth[0]).min() > (around @ plain[0]).min()
+    np.testing.assert_array_equal(light.harmonics(6, 0.0), plain)
+
+
+def _directions(count):
+    found = np.random.default_rng(2).normal(size=(count, 3))
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def test_texel_of_a_direction_is_the_one_that_looks_there():
+    np.testing.assert_array_equal(texel_of(cube_directions(8).reshape(-1, 3), 8), np.arange(6 * 64))
+
+
+def test_frame_of_the_ball_is_its_turn():
+    np.testing.assert_allclose(frame_of(scene().instances[1].world_from_object), TURN, atol=1e-12)
+
+
+# --- the lobe that is seen -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("roughness", "cosine"), [(0.4, 1.0), (0.6, 0.7), (0.8, 0.3), (1.0, 0.9)])
+def test_lobe_seen_is_the_brdf_times_the_cosine(roughness, cosine):
+    """Its mean direction and its harmonics around that, summed over all directions."""
+    towards, weights = quadrature(300)
+    alpha, view = roughness**2, np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
+    half = towards + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    normals = alpha**2 / (np.pi * (half[:, 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
+    z = np.maximum(towards[:, 2], 1e-6)
+    smith = [0.5 * (np.sqrt(1 + alpha**2 * (1 / c**2 - 1)) - 1) for c in (cosine, z)]
+    values = np.where(towards[:, 2] > 0, normals / (4 * cosine * (1 + sum(smith))), 0.0) * weights
+    mean = (values / values.sum()) @ towards
+    seen, axis = lobes.ggx_seen(6, roughness, cosine)
+    assert axis == pytest.approx(mean[2] / np.linalg.norm(mean), abs=2e-3)
+    around = sh.evaluate(towards, 6).T @ values / values.sum()
+    turned = lobes.turn(seen, mean / np.linalg.norm(mean))
+    # The lobe is not round: of what is, all is there.
+    for order in range(6):
+        band = slice(order**2, (order + 1) ** 2)
+        assert around[band] @ turned[band] == pytest.approx(turned[band] @ turned[band], abs=2e-3)
+
+
+def test_smooth_lobe_is_the_mirror():
+    seen, axis = lobes.ggx_seen(6, 0.05, 0.5)
+    np.testing.assert_allclose(seen * lobes.band_scales(6), 1.0, atol=0.01)
+    assert axis == pytest.approx(0.5, abs=1e-3)
+
+
+def test_rough_lobe_leans_from_the_mirrored_direction_to_the_normal():
+    axes = [lobes.ggx_seen(6, roughness, 0.3)[1] for roughness in (0.1, 0.4, 0.7, 1.0)]
+    assert all(a < b for a, b in zip(axes, axes[1:], strict=False)) and axes[-1] > 0.45
