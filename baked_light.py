@@ -16,7 +16,7 @@ from .gpu_scene import GpuScene
 from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
 from .gpu_shaders.prt import BakedObject, BakedObjects
 from .gpu_shaders.prt.shaders import LOBES_SIDE
-from .scene.data import Instance, Scene, Visibility, World
+from .scene.data import Instance, Scene, Visibility
 from .settings import Settings
 
 _BANDS = 6  # that the shader knows
@@ -33,7 +33,7 @@ class BakedLight:
         self._live: dict[Hashable, Live] = {}
         self._answered: dict[Hashable, tuple] = {}  # by Instance.key: what its light was worked out for
         self._surroundings = Surroundings(np.zeros(3))
-        self._world: World | None = None
+        self._revision = -1  # of the environment that these are
         self._drawn: list[BakedObject] = []
         self._up_to_date: tuple = ()
 
@@ -46,8 +46,12 @@ class BakedLight:
         self._up_to_date = key
         scene = gpu_scene.scene
         lit = [i for i in scene.instances if i.transfer is not None and _is_lit(i)] if wanted["use"] else []
-        if self._world != scene.world:
-            self._world, self._surroundings = scene.world, Surroundings(np.array(scene.world.color))
+        if self._revision != gpu_scene.environment.revision:
+            self._revision = gpu_scene.environment.revision
+            world = scene.world
+            self._surroundings = Surroundings(
+                np.array(world.color) if world.graph is None else gpu_scene.environment.pixels
+            )
             self._answered.clear()
         self._drawn = [self._object(scene, instance, wanted) for instance in lit]
         self._forget(lit)
@@ -55,7 +59,8 @@ class BakedLight:
 
     def draw(self, inputs: FrameInputs, targets: LightTargets, *, glossy: bool) -> None:
         """Add it to the direct targets, and mark its pixels for the techniques."""
-        self._objects.draw(inputs, self._drawn, targets, glossy=glossy)
+        world = inputs.gpu_scene.environment
+        self._objects.draw(inputs, self._drawn, targets, glossy=glossy, seen=(world.lights, world.mirrored))
 
     def free(self) -> None:
         self._objects.free()

@@ -15,17 +15,22 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .bake.job import BakeSettings, Kind
 from .bake.process import BakeProcess, Outcome
+from .bake.surfaces import mesh_vertices
+from .scene.changes import world_bounds
 from .scene.convert import convert_scene, is_own_surface
-from .scene.data import BakeState
+from .scene.data import BakeState, Instance, Scene
 from .scene.errors import SceneError
 from .settings import BAKE_SETTINGS
 
 LOGGER = logging.getLogger("rebound")
 
 SUFFIX = ".transfer.exr"
+# A triangle of more than two parts in so many of the scene's size is large.
+COARSE = 8.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class TransferBake:
     def __init__(self, depsgraph, objects: Iterable, settings: BakeSettings, *, pack: bool) -> None:
         """Raises SceneError where an object cannot be baked, or files have no place; OSError."""
         self.pack = pack
+        self.warnings: list[str] = []
         self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside()
         try:
             scene = convert_scene(depsgraph, for_viewport=True)
@@ -86,14 +92,20 @@ class TransferBake:
         files: dict[Hashable, Path] = {}
         for obj in objects:
             uid = obj.session_uid
-            key = next((i.key for i in scene.instances if is_own_surface(i.key, uid)), None)
-            if key is None:
+            instance = next((i for i in scene.instances if is_own_surface(i.key, uid)), None)
+            if instance is None:
                 raise SceneError(f"Object '{obj.name}' has no surface that is shown: leave it out of the bake")
             if obj.library is not None and obj.override_library is None:
                 raise SceneError(f"Object '{obj.name}' is linked from another file: bake it there, or override it")
             target = _Target(uid, obj.name, self._folder / _file_name(obj.name, {t.file.name for t in self._targets}))
             self._targets.append(target)
-            files[key] = target.file
+            files[instance.key] = target.file
+            if _is_coarse(scene, instance):
+                count = len(mesh_vertices(scene.meshes[instance.mesh])[0])
+                self.warnings.append(
+                    f"Object '{obj.name}' has {count} vertices: baked light is as fine as the mesh, subdivide it to "
+                    "see shadows on it"
+                )
         if not self.pack:
             self._folder.mkdir(parents=True, exist_ok=True)
         return files
@@ -140,7 +152,7 @@ def bake(
         if work.step() is Outcome.CANCELLED:
             raise SceneError("The bake was cancelled, bakes of before are as they were")
         LOGGER.info("baked %s in %s, %s", ", ".join(work.names), _duration(work.process.seconds), work.process.device)
-        return work.process.warnings
+        return [*work.warnings, *work.process.warnings]
     finally:
         work.close()
 
@@ -193,6 +205,15 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
 def surfaces(objects: Iterable) -> list:
     """Those of the objects that may have a surface."""
     return [obj for obj in objects if obj.type in {"MESH", "CURVE", "SURFACE", "META", "FONT"}]
+
+
+def _is_coarse(scene: Scene, instance: Instance) -> bool:
+    """Whether a triangle is so large beside the scene that light changes over it."""
+    boxes = np.array([world_bounds(i, scene) for i in scene.instances])
+    across = np.linalg.norm(boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0))
+    points = scene.meshes[instance.mesh].positions.astype(np.float64) @ instance.world_from_object[:3, :3].T
+    a, b, c = points.reshape(-1, 3, 3).transpose(1, 0, 2)
+    return bool(np.linalg.norm(np.cross(b - a, c - a), axis=1).max() > (across / COARSE) ** 2)
 
 
 def _take_off(obj) -> None:

@@ -89,7 +89,7 @@ changing the world then costs nothing. Works beside Blender; Esc cancels and lea
         if outcome is Outcome.CANCELLED:
             self.report({"WARNING"}, "The bake was cancelled: bakes of before are as they were")
             return {"CANCELLED"}
-        for line in process.warnings:
+        for line in (*self._bake.warnings, *process.warnings):
             self.report({"WARNING"}, line)
         self.report({"INFO"}, f"Baked {names} in {process.seconds:.0f} s ({process.device})")
         return {"FINISHED"}

@@ -39,6 +39,7 @@ class Environment:
         self.drawn = 0
         self.suns: tuple[Light, ...] = ()
         self.harmonics = np.zeros((9, 3))
+        self.pixels = np.zeros((PLAIN_SIDE, PLAIN_SIDE, 3), np.float32)  # the map without its suns
         self.texture = device.texture((PLAIN_SIDE * 3 // 2, PLAIN_SIDE), "RGBA32F")
         self._values: Texture | None = None
         self._images: tuple[Texture, ...] = ()
@@ -54,7 +55,7 @@ class Environment:
         self.revision += 1
         pixels, suns = without_suns(self._radiance(), world.sun_threshold, world.sun_angle)
         self.suns = tuple(_lamp(world, sun, number) for number, sun in enumerate(suns))
-        self.harmonics = harmonics(pixels)
+        self.pixels, self.harmonics = pixels, harmonics(pixels)
         self.device.free(self.texture)
         picture = pyramid(pixels)
         self.texture = self.device.texture(picture.shape[1::-1], "RGBA32F", picture)

@@ -29,7 +29,8 @@ __all__ = ["SHADERS", "BakedObject", "BakedObjects"]
 
 # Texels in a row of a texture of vertices.
 ROW_TEXELS = 2048
-OVER_GBUFFER = DrawState(depth_test="LESS_EQUAL")
+# Nothing else: what is seen through an object that lets light pass has its own light.
+OVER_GBUFFER = DrawState(depth_test="EQUAL")
 
 
 @dataclass(eq=False)
@@ -101,8 +102,13 @@ class BakedObjects:
         for key in self._lights.keys() - lights:
             self.device.free(self._lights.pop(key)[0])
 
-    def draw(self, inputs: FrameInputs, objects: list[BakedObject], targets: LightTargets, *, glossy: bool) -> None:
-        """Add the objects' light to the direct targets, and mark their pixels in the G-buffer's position."""
+    def draw(
+        self, inputs: FrameInputs, objects: list[BakedObject], targets: LightTargets, *, glossy: bool, seen=(True, True)
+    ) -> None:
+        """Add the objects' light to the direct targets, and mark their pixels in the G-buffer's position.
+
+        ``seen``: whether the world lights diffusely, and whether it is mirrored.
+        """
         pictures, over = self._targets(inputs)
         self.device.clear(pictures)
         for one in objects:
@@ -130,8 +136,9 @@ class BakedObjects:
                 **(looks if is_full else {}),
             )
         diffuse, mirrored = pictures.colors
-        self.device.fullscreen(RESOLVE, targets.diffuse_direct, state=ADD, sum_tx=diffuse, pc_weight=1.0)
-        if glossy:
+        if seen[0]:
+            self.device.fullscreen(RESOLVE, targets.diffuse_direct, state=ADD, sum_tx=diffuse, pc_weight=1.0)
+        if glossy and seen[1]:
             self.device.fullscreen(RESOLVE, targets.glossy_direct, state=ADD, sum_tx=mirrored, pc_weight=1.0)
 
     def free(self) -> None:

@@ -17,7 +17,7 @@ from rebound.operators.bake_transfer import REBOUND_OT_bake_transfer
 from rebound.scene.errors import SceneError
 from rebound.session import SESSIONS, Session
 from rebound.tests.support.blender_build import convert, link
-from rebound.tests.support.engine_build import rebound_scene
+from rebound.tests.support.engine_build import picture, rebound_scene, render
 from rebound.ui.transfer_panels import state_lines
 
 __all__ = ["rebound_scene"]
@@ -53,6 +53,11 @@ def test_operator_bakes_the_selected_into_files_beside_the_blend(saved, tmp_path
     found = read_bake(tmp_path / "a.bakes" / "Floor.transfer.exr")
     assert found.about["settings"]["directions"] == 64
     assert found.arrays["diffuse"].shape == (4, 3, 25)
+
+
+def test_coarse_mesh_is_warned_of(saved):
+    lines = baking.bake([floor(), bpy.data.objects["Box"]], QUICK)
+    assert len(lines) == 1 and "'Floor' has 4 vertices" in lines[0] and "subdivide" in lines[0]
 
 
 def test_bake_lights_the_instance_of_its_object(saved):
@@ -329,3 +334,20 @@ def test_command_bakes_a_file_and_saves_it(saved, tmp_path):
 )
 def test_command_ends_with_a_status(saved, tmp_path, words, status):
     assert bake_command.run([word.format(tmp_path) for word in words]) == status
+
+
+# --- in the picture --------------------------------------------------------------------------------------------------
+
+
+def test_baked_objects_are_lit_by_their_bakes(saved, tmp_path):
+    """A grey world alone. The floor's four corners know nothing of the box in its middle: a tenth too bright there."""
+    bpy.data.lights["Spot"].energy = 0
+    saved.rebound.samples, saved.rebound.bake_directions = 4, 1024
+    live = picture(render(saved, tmp_path / "live.exr"))
+    bpy.ops.rebound.bake_transfer(objects="ALL")
+    saved.rebound.method = "NONE"
+    found = picture(render(saved, tmp_path / "baked.exr"))
+    assert abs(found - live)[..., :3].mean() < 0.1 * live[..., :3].mean()
+    saved.rebound.transfer_use = False
+    dark = picture(render(saved, tmp_path / "dark.exr"))
+    assert dark[..., :3].mean() < 0.5 * found[..., :3].mean()
