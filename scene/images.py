@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import bpy
+import gpu
 import numpy as np
 
 from .data import Image
@@ -26,18 +27,18 @@ class ImageReader:
         self._on_main_thread = on_main_thread
         self._previous = previous
         self._warn = warn
-        self._done: dict[tuple[int, str], Hashable | None] = {}
+        self._done: dict[tuple[int, str, int], Hashable | None] = {}
 
     def read(self, image, user=None) -> Hashable | None:
         """Return the key of a bpy image's pixels, or None (and one warning) where there are no pixels.
 
-        ``user`` is the ImageUser of the node that shows it; it knows the frame of an image sequence.
+        ``user`` is the ImageUser of the node that shows it; it knows the frame of an image sequence or movie.
         """
         original = image.original or image
-        path = frame_path(original, user)
-        visit = (original.session_uid, path)
+        path, frame = frame_of(original, user)
+        visit = (original.session_uid, path, frame)
         if visit not in self._done:
-            self._done[visit] = self._read(original, path)
+            self._done[visit] = self._read(original, path, frame)
         return self._done[visit]
 
     def keep(self, key: Hashable, make: Callable[[], Image]) -> Hashable:
@@ -46,9 +47,9 @@ class ImageReader:
             self.images[key] = self._previous.get(key) or make()
         return key
 
-    def _read(self, image, path: str) -> Hashable | None:
-        key = image_key(image, path)
-        found = self._previous.get(key) or self._read_pixels(image, key, path)
+    def _read(self, image, path: str, frame: int) -> Hashable | None:
+        key = image_key(image, path, frame)
+        found = self._previous.get(key) or self._read_pixels(image, key, path, frame)
         if found is None:
             name = path or image.filepath
             reason = f"the file '{name}' is missing or cannot be read" if name else "it has no pixels"
@@ -59,23 +60,27 @@ class ImageReader:
         self.images[key] = found
         return key
 
-    def _read_pixels(self, image, key: Hashable, path: str) -> Image | None:
+    def _read_pixels(self, image, key: Hashable, path: str, frame: int) -> Image | None:
         if image.source == "TILED":
             return self._on_main_thread(lambda: _read_tiles(image, key))
         if not path:
             return read_image(image, key, self._on_main_thread)
-        return self._on_main_thread(lambda: _read_file(path, image, key))
+        return self._on_main_thread(lambda: _read_file(path, image, key, frame))
 
 
-def frame_path(image, user) -> str:
-    """The file of an image sequence's current frame; "" for any other image."""
-    if image.source != "SEQUENCE" or user is None:
-        return ""
-    return bpy.path.abspath(image.filepath_from_user(image_user=user), library=image.library)
+def frame_of(image, user) -> tuple[str, int]:
+    """The file of an image sequence's current frame, or a movie and its frame; "" for any other image."""
+    if user is None or image.source not in {"SEQUENCE", "MOVIE"}:
+        return "", 0
+    if image.source == "MOVIE":
+        return bpy.path.abspath(image.filepath, library=image.library), user.frame_current
+    return bpy.path.abspath(image.filepath_from_user(image_user=user), library=image.library), 0
 
 
-def _read_file(path: str, image, key: Hashable) -> Image | None:
+def _read_file(path: str, image, key: Hashable, frame: int = 0) -> Image | None:
     """Read a frame or a tile through a temporary data-block: Image.pixels itself knows neither.
+
+    Of a movie it knows the frame that was sent to the GPU last.
 
     Only on the main thread, where data-blocks may be made.
     """
@@ -83,10 +88,22 @@ def _read_file(path: str, image, key: Hashable) -> Image | None:
         return None
     loaded = bpy.data.images.load(path)
     try:
-        loaded.colorspace_settings.name, loaded.alpha_mode = image.colorspace_settings.name, image.alpha_mode
+        if image.colorspace_settings.name:  # none until it was loaded itself: then that of its kind of file
+            loaded.colorspace_settings.name = image.colorspace_settings.name
+        loaded.alpha_mode = image.alpha_mode
+        if loaded.source == "MOVIE" and _has_gpu():
+            loaded.gl_load(frame=frame)
         return read_image(loaded, key, lambda call: call())
     finally:
         bpy.data.images.remove(loaded)
+
+
+def _has_gpu() -> bool:
+    """Without one, Blender ends when an image is to be sent to it."""
+    try:
+        return gpu.platform.backend_type_get() not in {"NONE", "UNKNOWN"}
+    except SystemError:
+        return False
 
 
 def _read_tiles(image, key: Hashable) -> Image | None:
@@ -142,10 +159,10 @@ def _side_by_side(parts: Mapping[int, Image]) -> Image:
     return replace(first, pixels=sheet, is_srgb=first.is_srgb and alike, tiles=tiles)
 
 
-def image_key(image, path: str = "") -> Hashable:
+def image_key(image, path: str = "", frame: int = 0) -> Hashable:
     """The key of a bpy image's pixels, found without reading them (but where they were painted on).
 
-    ``path`` is the file of a sequence's frame.
+    ``path`` is the file of a sequence's frame, or of a movie, of which it is ``frame``.
     """
     state = (
         image.session_uid,
@@ -154,6 +171,7 @@ def image_key(image, path: str = "") -> Hashable:
         image.colorspace_settings.name,
         image.alpha_mode,
         path,
+        frame,
         _file_time(image, path),
     )
     if image.source == "TILED":

@@ -38,8 +38,6 @@ def read_image(image, key: Hashable, on_main_thread: OnMainThread) -> Image | No
     if not (image.has_data and width and height and image.channels):
         return None
     warnings: list[str] = []
-    if image.source == "MOVIE":
-        warnings.append(f"Image '{image.name}': of a movie only the frame that Blender has loaded is shown")
     raw = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(raw)
     raw = _rgba(raw.reshape(height, width, image.channels))

@@ -349,6 +349,43 @@ def test_sequence_shows_the_frame_of_the_scene(tmp_path):
         previous = scene
 
 
+@pytest.mark.slow
+def test_movie_shows_the_frame_of_the_scene(tmp_path, clean_scene):
+    movie(clean_scene, tmp_path)
+    image = bpy.data.images.load(str(next(tmp_path.glob("*.mp4"))))
+    node = textured(image)
+    node.image_user.frame_duration, node.image_user.use_auto_refresh = 6, True
+    reds, previous = [], None
+    for frame in (6, 1, 3):
+        bpy.context.scene.frame_set(frame)
+        scene = convert(previous=previous)
+        reds.append(float(pixels_of(scene)[0, 0, 0]))
+        assert scene.warnings == () and len(bpy.data.images) <= 2  # with Blender's Render Result
+        previous = scene
+    assert reds[1] < reds[2] < reds[0]
+
+
+def movie(scene, folder):
+    """A movie of six frames that turns from black to red."""
+    render = scene.render
+    render.engine, scene.cycles.samples = "CYCLES", 1
+    render.resolution_x = render.resolution_y = 64
+    scene.frame_start, scene.frame_end = 1, 6
+    if hasattr(render.image_settings, "media_type"):
+        render.image_settings.media_type = "VIDEO"
+    render.image_settings.file_format, render.ffmpeg.format = "FFMPEG", "MPEG4"
+    render.ffmpeg.codec, render.filepath = "H264", str(folder / "movie")
+    scene.camera = link("Camera", bpy.data.cameras.new("Camera"))
+    scene.world = bpy.data.worlds.new("World")
+    if bpy.app.version < (5, 0, 0):
+        scene.world.use_nodes = True
+    color = scene.world.node_tree.nodes["Background"].inputs["Color"]
+    for frame in (1, 6):
+        color.default_value = ((frame - 1) / 5, 0, 0, 1)
+        color.keyframe_insert("default_value", frame=frame)
+    bpy.ops.render.render(animation=True)
+
+
 def test_missing_frame_of_a_sequence_is_magenta(tmp_path):
     sequence(tmp_path)
     (tmp_path / "clip0002.png").unlink()
