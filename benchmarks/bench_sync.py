@@ -59,7 +59,7 @@ def build(case: Case) -> None:
     scene = bpy.context.scene
     scene.render.engine = "REBOUND"
     materials = [material(f"Material {i}", (0.2 + 0.06 * i, 0.5, 0.4)) for i in range(10)]
-    meshes = [_sheet(f"Sheet {i}", case.triangles) for i in range(case.meshes)]
+    meshes = [_sheet(i, case.triangles) for i in range(case.meshes)]
     for number, made in enumerate(meshes):
         made.materials.append(materials[number % len(materials)])
     side = int(case.objects**0.5 + 0.999)
@@ -76,14 +76,14 @@ def build(case: Case) -> None:
     bpy.context.view_layer.update()
 
 
-def _sheet(name: str, triangles: int):
-    """A mesh of a bumpy sheet, 2 m a side, smooth, with a UV map."""
+def _sheet(number: int, triangles: int):
+    """A mesh of a bumpy sheet, 2 m a side, smooth, with a UV map; no two are alike, or they would be one."""
     cells = max(int((triangles / 2) ** 0.5), 1)
     edge = np.linspace(-1.0, 1.0, cells + 1, dtype=np.float32)
     x, y = np.meshgrid(edge, edge, indexing="ij")
-    made = bpy.data.meshes.new(name)
+    made = bpy.data.meshes.new(f"Sheet {number}")
     made.vertices.add((cells + 1) ** 2)
-    made.vertices.foreach_set("co", np.stack((x, y, 0.1 * np.sin(6 * x) * np.cos(5 * y)), -1).ravel())
+    made.vertices.foreach_set("co", np.stack((x, y, 0.1 * np.sin(6 * x + number) * np.cos(5 * y)), -1).ravel())
     index = np.arange((cells + 1) ** 2, dtype=np.int32).reshape(cells + 1, cells + 1)
     corners = np.stack((index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]), -1).ravel()
     made.loops.add(len(corners))

@@ -73,11 +73,8 @@ class Vertices:
         self.handle: Any = None
         #: Whatever the backend makes of it for a shader, by shader.
         self.cache: dict = {}
-
-    @property
-    def bytes(self) -> int:
-        """GPU memory: every component takes four bytes."""
-        return self.count * sum(4 * components for _, components in self.layout.values())
+        #: GPU memory: every component takes four bytes.
+        self.bytes = count * sum(4 * components for _, components in layout.values())
 
 
 @dataclass(frozen=True)

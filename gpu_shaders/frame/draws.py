@@ -22,7 +22,8 @@ ADD = DrawState(blend="ADDITIVE")
 
 def visible_draws(gpu_scene: GpuScene, visibility: Visibility, seen=None) -> list[Draw]:
     """The draws that take part in any of ``visibility`` and that ``seen``, a test of (n, 2, 3) boxes, lets through."""
-    draws = [draw for draw in gpu_scene.draws if draw.visibility & visibility]
+    wanted = visibility.value  # plain numbers: flags are ten times as slow
+    draws = [draw for draw in gpu_scene.draws if draw.visibility.value & wanted]
     if seen is None or not draws:
         return draws
     return [draw for draw, inside in zip(draws, seen(np.array([d.bounds for d in draws])), strict=True) if inside]
