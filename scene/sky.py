@@ -2,15 +2,19 @@
 
 T. Nishita et al., "Display of the Earth Taking into Account Atmospheric Scattering", SIGGRAPH 1993, for one scattering;
 F. García Liñán, "Real-Time Spectral Sky", 2024, with a fit for all of them; A. Preetham et al., "A Practical Analytic
-Model for Daylight", SIGGRAPH 1999. Knows no Blender. Angles are radians, heights kilometres, colours CIE XYZ.
+Model for Daylight", SIGGRAPH 1999; L. Hosek, A. Wilkie, "An Analytic Model for Full Spectral
+Sky-Dome Radiance", SIGGRAPH 2012. Knows no Blender. Angles are radians, heights kilometres, colours CIE XYZ.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
+
+from . import sky_daylight as daylight
 
 Array = np.ndarray
 
@@ -109,6 +113,31 @@ def sun_radiance(air: Air, diameter: float) -> tuple[Array, Array]:
 def horizon(air: Air) -> float:
     """Elevation at which the Earth ends."""
     return -float(np.arccos(air.radius / air.eye))
+
+
+def daylight_picture(elevation: float, turbidity: float, albedo: float) -> Array:
+    """As ``sky_picture``, of Hosek and Wilkie's sky: blends of what was fitted to the nearest turbidities and suns."""
+    up = rows_to_elevation((np.arange(HEIGHT) + 0.5) / HEIGHT)[:, None]
+    around = (2 * np.pi * (np.arange(WIDTH) + 0.5) / WIDTH - np.pi)[None]
+    sun = np.radians(min(max(np.degrees(elevation), daylight.ELEVATIONS[0]), daylight.ELEVATIONS[-1]))
+    cosine = np.cos(up) * np.cos(around) * np.cos(sun) + np.sin(up) * np.sin(sun)
+    gamma = np.arccos(np.clip(cosine, -1, 1))[..., None]
+    rise = np.maximum(np.sin(up), 1e-3)[..., None]
+    found = np.zeros((HEIGHT, WIDTH, 3))
+    nodes = (_nearest(daylight.ALBEDOS, albedo), _nearest(daylight.TURBIDITIES, turbidity))
+    for (h, whole), (i, share), (j, part) in product(*nodes, _nearest(daylight.ELEVATIONS, float(np.degrees(sun)))):
+        a, b, c, d, e, f, level = daylight.FIT[h, i, j].T
+        shape = 1 + c * np.exp(d * gamma) + e * np.cos(gamma) ** 2 + f * np.sqrt(rise)
+        shape = shape * (1 + a * np.exp(b / (rise + 0.01)))
+        found += whole * share * part * level * np.maximum(shape, 0.0)
+    return (found @ _XYZ_FROM_RGB.T).astype(np.float32)
+
+
+def _nearest(places: tuple[float, ...], at: float) -> list[tuple[int, float]]:
+    """The two places around a number, and the share of each."""
+    index = int(np.clip(np.searchsorted(places, at) - 1, 0, len(places) - 2))
+    part = float(np.clip((at - places[index]) / (places[index + 1] - places[index]), 0, 1))
+    return [(index, 1 - part), (index + 1, part)]
 
 
 def preetham_picture(elevation: float, turbidity: float) -> Array:
@@ -319,6 +348,9 @@ def _many_spectrum() -> Spectrum:
     )
 
 
+_XYZ_FROM_RGB = np.array(
+    [[0.4123908, 0.3575843, 0.1804808], [0.212639, 0.7151687, 0.0721923], [0.0193308, 0.1191948, 0.9505322]]
+)
 # Absorption of ozone where it is densest, 1/m, from 380 to 780 nm.
 _OZONE = np.array(
     [

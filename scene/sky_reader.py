@@ -16,11 +16,10 @@ NOTHING = (0.0, 0.0, 0.0)
 
 
 class SkyReader:
-    """Reads the skies of one world; ``problems`` names what is shown by another model."""
+    """Reads the skies of one world."""
 
     def __init__(self, images: ImageReader):
         self._images = images
-        self.problems: dict[str, None] = {}
 
     def read(self, node) -> tuple[Hashable, Mapping[str, tuple[float, ...]]]:
         """The key of a node's picture, and the numbers of its sun. See ``gpu_shaders/materials/sky_lib.glsl``."""
@@ -31,10 +30,12 @@ class SkyReader:
     def _daylight(self, node) -> tuple[Hashable, Mapping[str, tuple[float, ...]]]:
         x, y, z = (float(c) for c in node.sun_direction)
         elevation = math.asin(min(max(z / (math.sqrt(x * x + y * y + z * z) or 1.0), 0.0), 1.0))
-        if node.sky_type == "HOSEK_WILKIE":
-            self.problems[f"node '{node.name}' is shown by Preetham's model instead of Hosek and Wilkie's"] = None
         numbers = (elevation, float(node.turbidity))
-        key = self._keep(("PREETHAM", *numbers), lambda: sky.preetham_picture(*numbers))
+        if node.sky_type == "HOSEK_WILKIE":
+            ground = float(node.ground_albedo)
+            key = self._keep(("HOSEK", *numbers, ground), lambda: sky.daylight_picture(*numbers, ground))
+        else:
+            key = self._keep(("PREETHAM", *numbers), lambda: sky.preetham_picture(*numbers))
         return key, _sun(math.atan2(y, x), elevation)
 
     def _atmosphere(self, node) -> tuple[Hashable, Mapping[str, tuple[float, ...]]]:

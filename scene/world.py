@@ -31,7 +31,7 @@ def read_world(world, images: ImageReader, warn: Callable[[str], None]) -> World
         return World(color, **_settings(world))
     skies = SkyReader(images)
     read = read_graph(world, images.read, skies.read, images.images.get)
-    problems = [*read.unsupported, *skies.problems, *_of_the_picture(read)]
+    problems = [*read.unsupported, *_of_the_picture(read)]
     if problems:
         warn(f"World '{world.name}': {'; '.join(problems)}")
     if read.filled.graph.surface is None:

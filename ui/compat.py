@@ -19,10 +19,11 @@ EXCLUDED = frozenset({
 })  # fmt: skip
 EXCLUDED_PREFIXES = ("VIEWLAYER_PT_freestyle",)
 
-# Panels of EEVEE that show plain Blender data: material and world nodes, light power and size.
+# Panels of EEVEE that show plain Blender data: material and world nodes, light power and size, the world's sun.
 INCLUDED = frozenset({
     "DATA_PT_EEVEE_light", "NODE_DATA_PT_EEVEE_light", "EEVEE_MATERIAL_PT_context_material",
-    "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface", "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes",
+    "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface", "EEVEE_WORLD_PT_settings", "EEVEE_WORLD_PT_sun",
+    "MATERIAL_PT_preview", "VIEWLAYER_PT_layer_passes",
     "VIEWLAYER_PT_override",
 })  # fmt: skip
 

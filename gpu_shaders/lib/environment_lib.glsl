@@ -51,7 +51,7 @@ float environment_level_of(sampler2D environment_tx, float omega)
 }
 
 /* Rays that the first one counts for. */
-const float ENVIRONMENT_RAYS = 4.0;
+const float ENVIRONMENT_RAYS = 16.0;
 
 /* The level over which a ray of some density is blurred: what one of the rays so far stands for, which falls with their number
  * (Krivanek & Colbert, "Real-time Shading with Filtered Importance Sampling", 2008). */

@@ -4,6 +4,9 @@
 
 /* Where the points' noise begins, beyond any picture's pixels. */
 const ivec2 CACHE_PIXEL = ivec2(1 << 20, 0);
+/* What a point keeps of light that is not asked for: enough to know that it is not inside of things. A dark corner whose
+ * rays found no light yet would else not answer, and brighter places in its stead. */
+const vec3 CACHE_LEAST = vec3(1e-30);
 
 void main()
 {
@@ -25,7 +28,7 @@ void main()
                                     from_sky, emitted);
     vec3 light = candidates_light(r, visible, place.xyz, N, N, N);
     float further = float(vpl_frame.kinds >> SOURCE_CACHE & 1);
-    out_sum += vec4(light + emitted + further * carried, 1.0);
+    out_sum += vec4(light + emitted + (further > 0.0 ? carried : min(carried, CACHE_LEAST)), 1.0);
     bool is_sky = r.id != 0 && vpl_id_kind(r.id) == SOURCE_SKY;
     out_sky += vec4((is_sky ? light : vec3(0.0)) + further * from_sky, 1.0);
   }

@@ -15,6 +15,9 @@ ONE = "SINGLE_SCATTERING" if NEW else "NISHITA"
 SKIES = [
     (ONE, 35.0, {}),
     (ONE, 4.0, {"altitude": 2000.0, "air_density": 2.0, "ozone_density": 3.0}),
+    ("HOSEK_WILKIE", 35.0, {"turbidity": 2.2}),
+    ("HOSEK_WILKIE", 60.0, {"turbidity": 5.0, "ground_albedo": 0.0}),
+    ("HOSEK_WILKIE", 8.0, {"turbidity": 3.0, "ground_albedo": 0.6}),
     ("PREETHAM", 35.0, {"turbidity": 2.2}),
     ("PREETHAM", 10.0, {"turbidity": 6.0}),
 ]
@@ -79,18 +82,16 @@ def shown(scene):
 
 @pytest.mark.parametrize("kind, elevation, values", SKIES)
 def test_the_sky_is_that_of_cycles(clean_scene, tmp_path, kind, elevation, values):
-    """Within 1 % of the light, and 2 % at the root of the mean square: near the horizon its picture is coarser."""
+    """Within 1 % of the light, and 2 % at the root of the mean square: near the horizon its picture is coarser.
+
+    Hosek and Wilkie's is a fit.
+    """
     make(kind, elevation, **values)
     found, omega = shown(convert_scene(bpy.context.evaluated_depsgraph_get(), for_viewport=True))
     truth = cycles_panorama(tmp_path / "sky.exr")
     level = (truth * omega).sum((0, 1))
     apart = np.sqrt((((found - truth) ** 2) * omega).sum() / ((truth**2) * omega).sum())
     print(f"\n{kind} {elevation}: energy {(found * omega).sum((0, 1)) / level}, apart {apart:.4f}")  # noqa: T201
-    np.testing.assert_allclose((found * omega).sum((0, 1)), level, rtol=0.01)
-    assert apart < 0.02
-
-
-def test_other_models_are_named(clean_scene):
-    make("HOSEK_WILKIE", 35.0)
-    lines = convert_scene(bpy.context.evaluated_depsgraph_get(), for_viewport=True).warnings
-    assert len(lines) == 1 and "Hosek" in lines[0] and "Sky Texture" in lines[0]
+    light, shape = (0.05, 0.07) if kind == "HOSEK_WILKIE" else (0.01, 0.02)
+    np.testing.assert_allclose((found * omega).sum((0, 1)), level, rtol=light)
+    assert apart < shape

@@ -47,7 +47,8 @@ SHOWN = {
         VIEWLAYER_PT_layer VIEWLAYER_PT_layer_passes
     """,
     "world": """
-        EEVEE_WORLD_PT_surface WORLD_PT_animation WORLD_PT_context_world WORLD_PT_custom_props
+        EEVEE_WORLD_PT_settings EEVEE_WORLD_PT_sun EEVEE_WORLD_PT_surface WORLD_PT_animation WORLD_PT_context_world
+        WORLD_PT_custom_props
     """,
 }
 ONLY = {
@@ -64,7 +65,8 @@ WHOLE = ("PARTICLE_PT_", "PHYSICS_PT_", "TEXTURE_PT_", "CAMERA_PT_", "NODE_", "S
 UNREAD = """
     DATA_PT_camera_dof DATA_PT_camera_dof_aperture CYCLES_CAMERA_PT_dof DATA_PT_camera_stereoscopy DATA_PT_lightprobe
     DATA_PT_EEVEE_light_shadow DATA_PT_EEVEE_light_distance EEVEE_MATERIAL_PT_volume EEVEE_MATERIAL_PT_displacement
-    EEVEE_MATERIAL_PT_thickness EEVEE_MATERIAL_PT_settings EEVEE_WORLD_PT_volume EEVEE_WORLD_PT_mist EEVEE_WORLD_PT_sun
+    EEVEE_MATERIAL_PT_thickness EEVEE_MATERIAL_PT_settings EEVEE_WORLD_PT_volume EEVEE_WORLD_PT_mist
+    EEVEE_WORLD_PT_lightprobe
     RENDER_PT_eevee_raytracing RENDER_PT_eevee_next_raytracing RENDER_PT_eevee_motion_blur RENDER_PT_freestyle
     RENDER_PT_eevee_next_motion_blur RENDER_PT_eevee_film RENDER_PT_eevee_next_film RENDER_PT_eevee_depth_of_field
     RENDER_PT_stereoscopy RENDER_PT_output_views VIEWLAYER_PT_filter VIEWLAYER_PT_layer_passes_cryptomatte
