@@ -39,7 +39,9 @@ class Viewport:
         space = context.space_data
         self.error, self._failed_for, self._synced = "", None, False
         SESSIONS.newest = self.session.status
-        self.session.sync(depsgraph, for_viewport=True, visible=lambda obj: obj.visible_in_viewport_get(space))
+        self.session.sync(
+            depsgraph, for_viewport=True, visible=lambda obj: obj.visible_in_viewport_get(space), shows=_shows(space)
+        )
         self._synced = True
 
     def draw(self, context, depsgraph) -> None:
@@ -95,6 +97,14 @@ def _of_active_light(settings: Settings, scene: Scene, depsgraph) -> Settings:
     names = [light.name for light in scene.lights]
     number = names.index(active.name) + 1 if active is not None and active.name in names else 0
     return Settings({**settings.values, "show_light": number})
+
+
+def _shows(space) -> tuple[bool, ...] | None:
+    """The kinds of objects that a 3D viewport shows; None where it shows some objects only, as in local view."""
+    if space.local_view is not None or space.use_local_collections:
+        return None
+    kinds = ("mesh", "curve", "surf", "meta", "font", "curves", "pointcloud", "light", "empty")
+    return tuple(getattr(space, f"show_object_viewport_{kind}") for kind in kinds)
 
 
 @contextmanager

@@ -29,6 +29,7 @@ class _Read:
     matrices: Array  # (n, 4, 4) float32
     ids: Array  # (n,) int32: hashes of what each item is
     instancers: frozenset[int]  # session uids of the objects that place others
+    shows: Hashable  # what else decides what is seen
 
 
 class SceneFollower:
@@ -46,10 +47,16 @@ class SceneFollower:
         *,
         for_viewport: bool,
         visible: Callable[[object], bool] | None = None,
+        shows: Hashable = (),
         on_main_thread: OnMainThread = here,
     ) -> Scene:
-        """As ``convert_scene``, whose ``previous`` is the scene read last. To be called for every update there is."""
+        """As ``convert_scene``, whose ``previous`` is the scene read last. To be called for every update there is.
+
+        ``shows`` is all that ``visible`` goes by beside what updates tell of; None where that cannot be said.
+        """
         before, self._read = self._read, None
+        if before and (shows is None or shows != before.shows):
+            before = None
         moved = _moved_objects(depsgraph, before) if before and for_viewport and not self.scene.bakes else None
         found = self._with_new_places(before, moved, depsgraph) if before and moved else None
         if found is not None:
@@ -59,9 +66,10 @@ class SceneFollower:
         reader.add_all()
         self.scene, self._known = reader.scene(), reader.states
         self._states = {(state[:3], mesh.key) for state, mesh in reader.states.items()}
-        if for_viewport and reader.is_whole:
+        if for_viewport and reader.is_whole and shows is not None:
             ids, matrices = _item_ids(depsgraph, len(reader.rows)), instance_matrices(depsgraph, len(reader.rows))
-            self._read = _Read(_place(depsgraph), tuple(reader.rows), matrices, ids, frozenset(reader.instancers))
+            rows, instancers = tuple(reader.rows), frozenset(reader.instancers)
+            self._read = _Read(_place(depsgraph), rows, matrices, ids, instancers, shows)
         return self.scene
 
     def _with_new_places(self, before: _Read, moved: Mapping[int, Any], depsgraph) -> tuple[Scene, _Read] | None:

@@ -17,6 +17,7 @@ class Follow:
 
     def __init__(self, monkeypatch):
         self.follower, self.whole, self.error = SceneFollower(), 0, None
+        self.shows = ()
         original = SceneReader.add_all
 
         def counted(reader):
@@ -32,7 +33,7 @@ class Follow:
 
     def _sync(self, depsgraph):
         try:
-            self.follower.read(depsgraph, for_viewport=True)
+            self.follower.read(depsgraph, for_viewport=True, shows=self.shows)
         except Exception as error:  # noqa: BLE001  a handler's exceptions are only printed: kept for `after`
             self.error = error
 
@@ -87,6 +88,12 @@ def test_moved_light_and_camera_are_followed(follow):
 def test_scaled_area_light_is_read_anew(follow):
     whole, changes = follow.after(lambda: setattr(bpy.data.objects["Lamp"], "scale", (2, 2, 2)))
     assert whole == 0 and len(changes.lights) == 1
+
+
+def test_viewport_that_shows_other_objects_reads_the_scene(follow):
+    for shows, whole in (((True,), 1), ((True,), 0), (None, 1), (None, 1), ((), 1), ((), 0)):
+        follow.shows = shows
+        assert follow.after(shift("Cube 1"))[0] == whole
 
 
 def test_child_moves_with_its_parent(follow):
