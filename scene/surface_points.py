@@ -9,7 +9,7 @@ it is curved and scaled unevenly) the weight of each point makes good.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from .data import LUMINANCE, Array, Material, Mesh
 _CELLS_A_SIDE = 3
 # At most so many objects are huge: those that have so many times the area of all others.
 _MOST_HUGE, _HUGE = 4, 32.0
+# Points of huge objects that are tried for each that is kept, where those in a box count more.
+FOCUS_TRIES = 32
 # Pairs (i, j) of the six different elements of a symmetric matrix, and how often each counts in a product of two.
 _PAIRS, _TIMES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)), np.array([1.0, 1, 1, 2, 2, 2])
 
@@ -108,32 +110,34 @@ class SurfaceSampler:
         self._triangles: dict[Hashable, _Triangles] = {}
 
     def sample(
-        self, parts: Sequence[Part], matrices: Array, count: int, seed: int = 0, huge_share: float = 1.0
+        self,
+        parts: Sequence[Part],
+        matrices: Array,
+        count: int,
+        seed: int = 0,
+        huge_share: float = 1.0,
+        focus: Array | None = None,
     ) -> Points:
         """``count`` points, or none where nothing has an area. matrices: (n, 4, 4) of all instances.
 
-        Objects that would leave next to nothing to the others (a ground plane) get ``huge_share`` of the points.
+        Objects that would leave next to nothing to the others (a ground plane) get ``huge_share`` of the points, and
+        have half of those in the box ``focus``, (2, 3), if so many can be found there.
         """
         triangles = self._sorted(parts)
         cofactors = cofactor_matrices(matrices)
-        entries = _list_entries(parts, triangles, cofactors, huge_share)
+        measures = _measures(parts, triangles, cofactors)
+        huge = _limit_huge(measures, huge_share) if huge_share < 1.0 and measures else _NO_ROWS
+        entries = _entries(measures)
         if count < 1 or entries.total <= 0.0:
             return _NO_POINTS
-        numbers = _low_discrepancy(count, seed)
-        # A point's first number tells its side and its place in the distribution: each side is covered evenly.
-        side, place = np.divmod(2.0 * numbers[:, 0], 1.0)
-        chosen, within, shares = _choose(entries, place)
-        part = np.searchsorted(entries.starts, chosen, "right") - 1
-        offset = chosen - entries.starts[part]
-        cells = np.array([t.cells for t in triangles], np.int64)
-        row, cell = np.divmod(offset, cells[part])
-        instances = np.array([p.first_instance for p in parts], np.int64)[part] + row
-        corners = _gather(parts, triangles, part, cell, within)
-        points = _place(corners, numbers[:, 1:], np.where(side < 1.0, 1.0, -1.0))
-        stretch = np.linalg.norm(np.einsum("nij,nj->ni", cofactors[instances], points["geometric_normals"]), axis=1)
-        weights = corners["cell_area"] * stretch / (count * shares)
-        materials = np.array([p.material for p in parts], np.int64)[part]
-        return Points(instances=instances, materials=materials, weights=weights, **points)
+        points, placed = _draw(parts, triangles, cofactors, entries, _low_discrepancy(count, seed))
+        mine = np.flatnonzero(np.isin(placed, huge))
+        if focus is None or not len(mine):
+            return points
+        only_huge = _entries(_only(measures, huge))
+        numbers = _low_discrepancy(FOCUS_TRIES * len(mine), seed + 1)
+        tried, _ = _draw(parts, triangles, cofactors, only_huge, numbers)
+        return _replaced(points, mine, _focused(tried, matrices, focus, len(mine)))
 
     def _sorted(self, parts: Sequence[Part]) -> list[_Triangles]:
         wanted = {part.key: part for part in parts}
@@ -194,9 +198,8 @@ def _cells(normal: Array) -> Array:
     return number
 
 
-def _list_entries(
-    parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array, huge_share: float
-) -> _Entries:
+def _measures(parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array) -> list[Array]:
+    """Of each part, (rows, cells): estimated area of each cell of each placed one, times density."""
     # The square of an area vector's stretch is a quadratic form of its direction.
     squares = cofactors.swapaxes(1, 2) @ cofactors
     forms = np.stack([squares[:, i, j] for i, j in _PAIRS], -1) * _TIMES
@@ -206,14 +209,19 @@ def _list_entries(
         # By Cauchy and Schwarz at least the world area, and just that where a cell is flat or the scale even.
         area = np.sqrt(np.maximum(np.diff(known.starts) * (rows @ known.moments.T), 0.0)) * part.density
         measures.append(np.where(np.isfinite(area), area, 0.0))
-    if huge_share < 1.0 and measures:
-        _limit_huge(measures, huge_share)
+    return measures
+
+
+def _entries(measures: Sequence[Array]) -> _Entries:
     starts = np.cumsum([0, *(measure.size for measure in measures)])
     return _Entries(np.cumsum(np.concatenate([np.zeros(0), *(measure.ravel() for measure in measures)])), starts)
 
 
-def _limit_huge(measures: Sequence[Array], share: float) -> None:
-    """Make the few that have nearly all of the area ``share`` of it; (rows, cells) a part, changed in place."""
+def _limit_huge(measures: Sequence[Array], share: float) -> Array:
+    """Make the few that have nearly all of the area ``share`` of it; (rows, cells) a part, changed in place.
+
+    Returns which they are, counted over the rows of all parts.
+    """
     totals = np.concatenate([measure.sum(1) for measure in measures])
     order = np.argsort(-totals, kind="stable")
     for number in range(1, _MOST_HUGE + 1):
@@ -224,7 +232,62 @@ def _limit_huge(measures: Sequence[Array], share: float) -> None:
             ends = np.cumsum([len(measure) for measure in measures])
             for measure, factor in zip(measures, np.split(factors, ends[:-1]), strict=True):
                 measure *= factor[:, None]
-            return
+            return order[:number]
+    return _NO_ROWS
+
+
+def _only(measures: Sequence[Array], kept: Array) -> list[Array]:
+    """The measures of some placed parts, counted over the rows of all; 0 of the others."""
+    wanted = np.isin(np.arange(sum(len(measure) for measure in measures)), kept)
+    ends = np.cumsum([len(measure) for measure in measures])
+    return [measure * rows[:, None] for measure, rows in zip(measures, np.split(wanted, ends[:-1]), strict=True)]
+
+
+def _draw(
+    parts: Sequence[Part], triangles: Sequence[_Triangles], cofactors: Array, entries: _Entries, numbers: Array
+) -> tuple[Points, Array]:
+    """Points by (n, 3) numbers in [0, 1), and where each lies, counted over the rows of all parts."""
+    # A point's first number tells its side and its place in the distribution: each side is covered evenly.
+    side, place = np.divmod(2.0 * numbers[:, 0], 1.0)
+    chosen, within, shares = _choose(entries, place)
+    part = np.searchsorted(entries.starts, chosen, "right") - 1
+    cells = np.array([t.cells for t in triangles], np.int64)
+    row, cell = np.divmod(chosen - entries.starts[part], np.maximum(cells[part], 1))
+    instances = np.array([p.first_instance for p in parts], np.int64)[part] + row
+    corners = _gather(parts, triangles, part, cell, within)
+    points = _place(corners, numbers[:, 1:], np.where(side < 1.0, 1.0, -1.0))
+    stretch = np.linalg.norm(np.einsum("nij,nj->ni", cofactors[instances], points["geometric_normals"]), axis=1)
+    weights = corners["cell_area"] * stretch / (len(numbers) * shares)
+    materials = np.array([p.material for p in parts], np.int64)[part]
+    first_rows = np.cumsum([0, *(p.instance_count for p in parts)])
+    return Points(instances=instances, materials=materials, weights=weights, **points), first_rows[part] + row
+
+
+def _focused(tried: Points, matrices: Array, focus: Array, count: int) -> Points:
+    """``count`` of many points, half of them in a box; those of each side stand for all of that side."""
+    placed = matrices[tried.instances]
+    world = np.einsum("nij,nj->ni", placed[:, :3, :3], tried.positions) + placed[:, :3, 3]
+    inside = ((world >= focus[0]) & (world <= focus[1])).all(1)
+    here, there = np.flatnonzero(inside), np.flatnonzero(~inside)
+    wanted = max(min(len(here), count // 2), count - len(there))
+    kept, scales, places = [], [], []
+    for group, some in ((here, here[:wanted]), (there, there[: count - wanted])):
+        kept.append(some)
+        scales.append(np.full(len(some), tried.weights[group].sum() / max(tried.weights[some].sum(), 1e-300)))
+        places.append((np.arange(len(some)) + 0.5) / max(len(some), 1))
+    # Mixed, so that any run of them is as even as all.
+    order = np.argsort(np.concatenate(places), kind="stable")
+    rows = np.concatenate(kept)[order]
+    chosen = {entry.name: getattr(tried, entry.name)[rows] for entry in fields(Points)}
+    chosen["weights"] = chosen["weights"] * np.concatenate(scales)[order]
+    return Points(**chosen)
+
+
+def _replaced(points: Points, rows: Array, by: Points) -> Points:
+    arrays = {entry.name: getattr(points, entry.name).copy() for entry in fields(Points)}
+    for name, array in arrays.items():
+        array[rows] = getattr(by, name)
+    return Points(**arrays)
 
 
 def _low_discrepancy(count: int, seed: int) -> Array:

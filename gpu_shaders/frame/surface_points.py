@@ -17,6 +17,7 @@ from .reflective_shaders import SOURCE_DEFINES
 from .shaders import MESH_SAMPLERS
 from .structs import INSTANCE, MATERIAL
 from .tables import replace_table
+from .voxel_grids import grid_bounds
 
 if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
@@ -100,7 +101,7 @@ class SurfacePoints:
         shapes = gram_matrices(gpu_scene.matrices)
         sampled = tuple(part.layout for part in parts), side, seed
         if sampled != self._sampled or not self._same_shapes(shapes):
-            self._make(parts, gpu_scene.matrices, side * side, seed)
+            self._make(parts, gpu_scene, side * side, seed)
             self._sampled, self._shapes = sampled, shapes
             return True
         return self._looks_different(before, gpu_scene)
@@ -154,9 +155,9 @@ class SurfacePoints:
         old: tuple[Material, ...] = before[2]
         return moved or any(old[m] != gpu_scene.scene.materials[m] for m, _, _ in self._runs)
 
-    def _make(self, parts: list[Part], matrices: np.ndarray, count: int, seed: int) -> None:
-        huge_share = HUGE_SHARE if self.kind == "AREA" else 1.0
-        points = self._sampler.sample(parts, matrices, count, seed, huge_share)
+    def _make(self, parts: list[Part], gpu_scene: GpuScene, count: int, seed: int) -> None:
+        huge_share, focus = (HUGE_SHARE, grid_bounds(gpu_scene.boxes)) if self.kind == "AREA" else (1.0, None)
+        points = self._sampler.sample(parts, gpu_scene.matrices, count, seed, huge_share, focus)
         self.count = len(points)
         self.total_area = float(points.weights.sum())
         rows = [np.arange(p.first_instance, p.first_instance + p.instance_count) for p in parts]

@@ -153,10 +153,9 @@ class Vpl:
 
     def _sort_points(self, owner: str) -> None:
         """Have the index of one kind of surface points match the atlas."""
-        assert self.voxels.grid is not None
         tile = self.sources.tile_of(owner)
         if tile is not None:
-            self._indices[owner].update(self.sources, tile, self.voxels.grid)
+            self._indices[owner].update(self.sources, tile, self.voxels.grids)
 
     def _points(self, owner: str) -> tuple[int, int, int]:
         """Where a kind of surface points lies in the atlas: lower left texel and side, 0 where there are none."""
@@ -193,7 +192,8 @@ class Vpl:
             "clip_from_world": inputs.clip_from_world,
             "eye": inputs.eye,
             "sky": self.sources.viewport(sky) if sky else (0, 0, 0, 0),
-            "index": self._indices[CACHE].place,
+            **self._indices[CACHE].cubes,
+            "index_levels": len(self._indices[CACHE].places),
             "cache": self._points(CACHE),
             "pool": int(settings["pool"]),
             "emitters": self._points(EMITTERS),

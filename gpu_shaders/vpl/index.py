@@ -5,11 +5,14 @@ Its cells have six sides, for the ways that surfaces face, so that the two sides
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ...device.interface import Device, Target, Texture
 from ..frame.light_maps import MapTile
 from ..frame.voxels import VoxelGrid
 from .shaders import INDEX_CELLS, INDEX_SCATTER, INDEX_SPREAD
 from .sources import Sources
+from .structs import INDEX_LEVELS
 
 # How many cells away from a point its cell may lie: points are about so far apart on surfaces.
 SPREAD = 3
@@ -21,30 +24,42 @@ class PointIndex:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._grids: list[tuple[Texture, Target]] = []  # the newest first
-        self.place = (0.0, 0.0, 0.0, 0.0)  # lower corner of the cube, cells a metre
+        self.places = ((0.0, 0.0, 0.0, 0.0),)  # of each level's cube: lower corner, cells a metre
         self._none = device.texture((1, 1), "R32F")
 
-    def update(self, sources: Sources, tile: MapTile, grid: VoxelGrid) -> None:
-        """Sort the tile's points into the cells of the cube that ``grid`` lies in."""
-        if not self._grids:
-            for _ in range(2):
-                texture = self.device.texture((6 * INDEX_CELLS, INDEX_CELLS**2), "R32F")
-                self._grids.append((texture, self.device.target([texture])))
-        extent = grid.edge * float(grid.size.max())
-        self.place = (*grid.origin, INDEX_CELLS / extent)
+    def update(self, sources: Sources, tile: MapTile, grids: Sequence[VoxelGrid]) -> None:
+        """Sort the tile's points into the cells of cubes, one around each of the ``grids``, the innermost first."""
+        self._fit(len(grids))
+        self.places = tuple((*grid.origin, INDEX_CELLS / (grid.edge * float(grid.size.max()))) for grid in grids)
         x, y, side, _ = sources.points_viewport(tile)
-        shared = {"position_area_tx": sources.colors[0], "pc_index": self.place}
-        shared |= {"pc_origin": (x, y), "pc_side": side}
+        shared = {"position_area_tx": sources.colors[0], "pc_origin": (x, y), "pc_side": side}
         target = self._grids[0][1]
         self.device.clear(target)
-        with self.device.drawing(
-            INDEX_SCATTER, target, normal_kind_tx=sources.colors[1], flux_tx=sources.colors[2], **shared
-        ) as draw:
-            draw(count=9 * side * side)
+        kinds = {"normal_kind_tx": sources.colors[1], "flux_tx": sources.colors[2]}
+        for level, place in enumerate(self.places):
+            viewport = _viewport(level)
+            with self.device.drawing(INDEX_SCATTER, target, viewport=viewport, **kinds, **shared) as draw:
+                draw(count=9 * side * side, pc_index=place)
         for _ in range(SPREAD):
             (old, _), (_, target) = self._grids
-            self.device.fullscreen(INDEX_SPREAD, target, index_tx=old, **shared)
+            for level, place in enumerate(self.places):
+                given = {"index_tx": old, "pc_index": place, "pc_level": level}
+                self.device.fullscreen(INDEX_SPREAD, target, viewport=_viewport(level), **given, **shared)
             self._grids.reverse()
+
+    @property
+    def cubes(self) -> dict[str, tuple[float, ...]]:
+        """Members of VPL_FRAME."""
+        return {f"index_{level}": self.places[min(level, len(self.places) - 1)] for level in range(INDEX_LEVELS)}
+
+    def _fit(self, levels: int) -> None:
+        size = (6 * INDEX_CELLS, INDEX_CELLS**2 * levels)
+        if self._grids and self._grids[0][0].size == size:
+            return
+        self._free_grids()
+        for _ in range(2):
+            texture = self.device.texture(size, "R32F")
+            self._grids.append((texture, self.device.target([texture])))
 
     @property
     def texture(self) -> Texture:
@@ -52,8 +67,15 @@ class PointIndex:
         return self._grids[0][0] if self._grids else self._none
 
     def free(self) -> None:
+        self._free_grids()
+        self.device.free(self._none)
+
+    def _free_grids(self) -> None:
         for texture, target in self._grids:
             self.device.free(target)
             self.device.free(texture)
         self._grids.clear()
-        self.device.free(self._none)
+
+
+def _viewport(level: int) -> tuple[int, int, int, int]:
+    return 0, level * INDEX_CELLS**2, 6 * INDEX_CELLS, INDEX_CELLS**2

@@ -326,7 +326,7 @@ INDEX_SPREAD = Shader(
     fragment="vpl/vpl_index_spread_frag.glsl",
     outputs={"out_point": "VEC4"},
     samplers={"index_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D"},
-    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT"},
+    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT", "pc_level": "INT"},
     defines=_INDEX,
 )
 

@@ -1,6 +1,10 @@
 """Tables of the virtual point lights, and the numbers in them that have names."""
 
 from ...device.structs import Struct
+from ..frame.voxel_shaders import MOST_OUTER_GRIDS
+
+# Cubes that the surface points are sorted in: around every grid of voxels.
+INDEX_LEVELS = 1 + MOST_OUTER_GRIDS
 
 TILE = Struct(
     "VplTile",
@@ -26,7 +30,7 @@ VPL_FRAME = Struct(
     clip_from_world="mat4",  # of this sample's G-buffer
     eye="vec4",  # FrameInputs.eye
     sky="vec4",  # lower left texel and sides of the sky's tile, 0: none
-    index="vec4",  # the cube of the indices: lower corner, cells a metre
+    **{f"index_{level}": "vec4" for level in range(INDEX_LEVELS)},  # cubes of the indices: lower corner, cells a metre
     cache="vec3",  # lower left texel and side of the cache's points, 0: none
     pool="int",  # entries of the pool
     emitters="vec3",  # as cache
@@ -41,6 +45,7 @@ VPL_FRAME = Struct(
     lobe="float",  # least roughness of the lobes that lights send
     mirrored="int",  # 1: glossy surfaces show the world
     kinds="int",  # bits of SourceKind: which are asked
+    index_levels="int",
     number="int",  # of the sample in its sequence of noise
     seed="int",
 )

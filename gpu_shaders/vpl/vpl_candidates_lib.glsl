@@ -82,6 +82,28 @@ Vpl candidates_sky(vec3 direction)
   return vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
 }
 
+vec4 candidates_cube_of(int level)
+{
+  return level == 0   ? vpl_frame.index_0
+         : level == 1 ? vpl_frame.index_1
+         : level == 2 ? vpl_frame.index_2
+         : level == 3 ? vpl_frame.index_3
+         : level == 4 ? vpl_frame.index_4
+                      : vpl_frame.index_5;
+}
+
+/* The level of the indices that knows the surroundings of P best, and its cube. */
+vec4 candidates_cube(vec3 P, out int level)
+{
+  for (level = 0; level < vpl_frame.index_levels - 1; level++) {
+    vec3 place = index_place(candidates_cube_of(level), P);
+    if (all(greaterThanEqual(place, vec3(0.0))) && all(lessThan(place, vec3(float(VPL_INDEX))))) {
+      break;
+    }
+  }
+  return candidates_cube_of(level);
+}
+
 /* Radiance that the cache holds for what a ray hit after `far`, and the part of it that came from the sky: that of the point whose plane the hit lies on best, out of
  * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
  * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, it is not `known`:
@@ -91,14 +113,21 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out boo
   known = true;
   from_sky = vec3(0.0);
   float edge = voxel_edge_at(hit);
+  int level;
+  vec4 cube = candidates_cube(hit, level);
   vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
-  for (int attempt = 0; attempt < CANDIDATES_ATTEMPTS && vpl_frame.cache.z > 0.0; attempt++) {
+  int attempts = CANDIDATES_ATTEMPTS + vpl_frame.index_levels - 1;
+  for (int attempt = 0; attempt < attempts && vpl_frame.cache.z > 0.0; attempt++) {
+    if (attempt >= CANDIDATES_ATTEMPTS && level < vpl_frame.index_levels - 1) {
+      level++; /* points of a huge ground lie many of these cells apart */
+      cube = candidates_cube_of(level);
+    }
     vec3 aside = fract(noise + float(attempt) * vec3(0.8191725, 0.6710436, 0.5497005)) - 0.5;
-    vec3 place = index_place(vpl_frame.index, hit) + aside;
-    float nearest = CANDIDATES_VOXELS * edge + CANDIDATES_OFF_PLANE / vpl_frame.index.w;
+    vec3 place = index_place(cube, hit) + aside;
+    float nearest = CANDIDATES_VOXELS * edge + CANDIDATES_OFF_PLANE / cube.w;
     ivec2 best = ivec2(-1);
     for (int axis = 0; axis < 3; axis++) {
-      int point = index_point(cache_index_tx, place, index_side(axis, -direction[axis]));
+      int point = index_point(cache_index_tx, level, place, index_side(axis, -direction[axis]));
       if (point < 0) {
         continue;
       }
@@ -128,9 +157,11 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out boo
  * plane, and no farther from it than the cells around it reach. */
 ivec2 candidates_emitter(vec3 hit, vec3 direction)
 {
-  vec3 place = index_place(vpl_frame.index, hit);
+  int level;
+  vec4 cube = candidates_cube(hit, level);
+  vec3 place = index_place(cube, hit);
   for (int axis = 0; axis < 3 && vpl_frame.emitters.z > 0.0; axis++) {
-    int point = index_point(emitter_index_tx, place, index_side(axis, -direction[axis]));
+    int point = index_point(emitter_index_tx, level, place, index_side(axis, -direction[axis]));
     if (point < 0) {
       continue;
     }
@@ -139,7 +170,7 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction)
     vec3 apart = hit - texelFetch(position_area_tx, texel, 0).xyz;
     float area = texelFetch(position_area_tx, texel, 0).w;
     if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_edge_at(hit) &&
-        length(apart) < CANDIDATES_CELLS / vpl_frame.index.w + CANDIDATES_SPACING * sqrt(area)) {
+        length(apart) < CANDIDATES_CELLS / cube.w + CANDIDATES_SPACING * sqrt(area)) {
       return texel;
     }
   }

@@ -1,6 +1,7 @@
 /* Which point of the cache, or of the emitters, lies near: a cube of VPL_INDEX cells along a side around the scene, six
- * sides of each cell for the ways that surfaces face. `cube` is its lower corner and cells a metre. A flat texture has the
- * six sides side by side, and the cells' layers one above the other. */
+ * sides of each cell for the ways that surfaces face; and ever wider cubes where huge objects reach beyond it. `cube` is its
+ * lower corner and cells a metre. A flat texture has the six sides side by side, the cells' layers one above the other,
+ * and the levels above one another again. */
 #include "lib/math_lib.glsl"
 
 const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX *VPL_INDEX);
@@ -21,11 +22,11 @@ ivec2 index_texel(ivec3 cell, int side)
   return ivec2(cell.x + VPL_INDEX * side, cell.y + VPL_INDEX * cell.z);
 }
 
-/* The point that cell and side of `place` hold, or -1. */
-int index_point(sampler2D index_tx, vec3 place, int side)
+/* The point that cell and side of `place` hold in a level, or -1. */
+int index_point(sampler2D index_tx, int level, vec3 place, int side)
 {
   ivec3 cell = clamp(ivec3(floor(place)), ivec3(0), ivec3(VPL_INDEX - 1));
-  return int(texelFetch(index_tx, index_texel(cell, side), 0).x) - 1;
+  return int(texelFetch(index_tx, index_texel(cell, side) + ivec2(0, level * INDEX_SIZE.y), 0).x) - 1;
 }
 
 /* Texel of a point of the tile whose lower left texel and side are `tile`. */

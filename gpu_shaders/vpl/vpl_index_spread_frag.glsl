@@ -3,8 +3,9 @@
 
 void main()
 {
-  ivec2 texel = ivec2(gl_FragCoord.xy);
-  out_point = texelFetch(index_tx, texel, 0);
+  ivec2 base = ivec2(0, pc_level * INDEX_SIZE.y);
+  ivec2 texel = ivec2(gl_FragCoord.xy) - base;
+  out_point = texelFetch(index_tx, texel + base, 0);
   if (out_point.x != 0.0) {
     return;
   }
@@ -17,7 +18,7 @@ void main()
     if (any(lessThan(other, ivec3(0))) || any(greaterThanEqual(other, ivec3(VPL_INDEX)))) {
       continue;
     }
-    float point = texelFetch(index_tx, index_texel(other, side), 0).x;
+    float point = texelFetch(index_tx, index_texel(other, side) + base, 0).x;
     if (point == 0.0) {
       continue;
     }

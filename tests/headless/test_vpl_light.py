@@ -168,6 +168,17 @@ def test_ground_to_the_horizon_bounces_up(studio, half):
     assert found[4:].mean() == pytest.approx(expected[4:].mean(), rel=0.05)
 
 
+@pytest.mark.parametrize("half", [5.0, 500.0])
+def test_ground_to_the_horizon_sends_the_sky_back(studio, half):
+    """By the cache: far from all else it has points and cells of its own."""
+    ground = quad("ground", u=(half, 0, 0), v=(0, half, 0))
+    block = box("block", (-0.5, 0, 0), (0.5, 1, 1))
+    shown = still([ground, block], world=SKY)
+    found, points = gathered(studio, shown, FRONT, 16)
+    expected = 0.5 * form_factor(points, (0, -1, 0), (0, -half / 2, 0), (half, 0, 0), (0, half / 2, 0))
+    assert found[4:].mean() == pytest.approx(expected[4:].mean(), rel=0.1)  # the block hides some sky from the ground
+
+
 # --- emitters --------------------------------------------------------------------------------------------------------
 
 FLOOR = quad("floor")

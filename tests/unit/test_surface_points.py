@@ -150,6 +150,20 @@ def test_huge_ground_leaves_points_to_the_rest(size):
     assert alone.weights.sum() == pytest.approx(4 * size**2)
 
 
+def test_huge_ground_has_half_its_points_around_the_rest():
+    """Each side's points stand for all of its area, and come by turns."""
+    meshes = [quad("ground", u=(100, 0, 0), v=(0, 100, 0)), quad("table")]
+    focus = np.array([[-20.0, -20, -1], [20, 20, 1]])
+    parts, matrices = parts_of(meshes), np.tile(np.eye(4), (2, 1, 1))
+    points = SurfaceSampler().sample(parts, matrices, 4096, huge_share=0.5, focus=focus)
+    ground = points.instances == 0
+    near = (np.abs(points.positions[:, :2]) <= 20).all(1)
+    assert ground.sum() == pytest.approx(2048, abs=1) and (ground & near).sum() == pytest.approx(1024, abs=1)
+    np.testing.assert_allclose(points.weights[ground & near].sum(), 40**2, rtol=0.02)
+    np.testing.assert_allclose(points.weights[ground].sum(), 200**2, rtol=1e-3)
+    assert (ground & near)[:512].sum() == pytest.approx(128, abs=8)
+
+
 def test_points_are_interpolated_from_their_triangle():
     mesh = quad("quad", u=(2, 0, 0), v=(0, 1, 0))
     uvs = {"a": mesh.positions[:, :2] * 0.5 + 3, "b": mesh.positions[:, 1::-1]}
