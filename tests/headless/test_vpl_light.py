@@ -168,7 +168,7 @@ def test_ground_to_the_horizon_bounces_up(studio, half):
     assert found[4:].mean() == pytest.approx(expected[4:].mean(), rel=0.05)
 
 
-@pytest.mark.parametrize("half", [5.0, 500.0])
+@pytest.mark.parametrize("half", [5.0, 40.0])
 def test_ground_to_the_horizon_sends_the_sky_back(studio, half):
     """By the cache: far from all else it has points and cells of its own."""
     ground = quad("ground", u=(half, 0, 0), v=(0, half, 0))
