@@ -56,7 +56,7 @@ class GpuScene:
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._placed: list[Instance] = []  # those of every row
         self._told = np.zeros((0, 12))  # what materials can ask of them beside their place: _instance_row()
-        self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of the draws that let light pass
+        self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of the draws that let lamps' light pass
         self._meshes: dict[tuple[Hashable, Layout], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
         self.environment = Environment(device)
@@ -91,7 +91,7 @@ class GpuScene:
         drawn = [scene.materials[index] for index in {draw.material for draw in self.draws}]
         self.is_glossy = any(material.is_glossy for material in drawn)
         self.emits = any(any(material.emission) for material in drawn)
-        passing = [draw.bounds for draw in self.draws if self.lets_pass(draw.material)]
+        passing = [draw.bounds for draw in self.draws if self.lets_lamps_pass(draw.material)]
         self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
         if len(changes.moved_bounds):
             self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
@@ -126,6 +126,10 @@ class GpuScene:
     def lets_pass(self, material: int) -> bool:
         """Whether light may go on through a material."""
         return self.scene.materials[material].passing > 0.0
+
+    def lets_lamps_pass(self, material: int) -> bool:
+        """Whether lamps light what is behind a material: Blender's Transparent Shadows."""
+        return self.lets_pass(material) and self.scene.materials[material].passes_lamps
 
     def material_inputs(self, program: Shader) -> dict[str, Any]:
         """What a program of ``material_program`` wants to know of all materials."""

@@ -22,9 +22,11 @@ from mathutils import Matrix
 import rebound
 from rebound.benchmarks.jobs import SAID, Job
 from rebound.benchmarks.results import CYCLES, EEVEE, REBOUND
+from rebound.benchmarks.staging import stage
 from rebound.scene.cameras import active_camera, camera_view
 from rebound.scene.convert import convert_scene
 from rebound.scene.snapshot import save_snapshot
+from rebound.session import SESSIONS
 
 PASSES = ("use_pass_combined", "use_pass_diffuse_direct", "use_pass_diffuse_indirect", "use_pass_diffuse_color")
 # One render takes at most this long where several are made for a median.
@@ -56,7 +58,9 @@ class Worker:
         bpy.ops.wm.open_mainfile(filepath=job.blend)
         scene = bpy.context.scene
         if job.size:
-            scene.render.resolution_x, scene.render.resolution_y = job.size
+            width, height = job.size
+            by_aspect = round(width * scene.render.resolution_y / scene.render.resolution_x)
+            scene.render.resolution_x, scene.render.resolution_y = width, max(height or by_aspect, 4)
         scene.render.resolution_percentage = 100
         scene.render.use_border = False
         if job.camera:
@@ -64,6 +68,8 @@ class Worker:
             scene.camera.constraints.clear()
             scene.camera.animation_data_clear()
             scene.camera.matrix_world = Matrix(job.camera)
+        if job.staged:
+            stage(scene)
 
     def _snapshot(self, name: str, job: Job) -> dict[str, Any]:
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -93,7 +99,11 @@ class Worker:
         _save(scene, self.folder / file)
         seconds = statistics.median(times)
         print(f"{SAID}{job.engine}, {job.samples} samples{', first' if job.cold else ''}: {seconds:.2f} s", flush=True)
-        return {"file": file, "seconds": seconds, "runs": len(times), "details": {}}
+        return {"file": file, "seconds": seconds, "runs": len(times), "details": _details(job)}
+
+
+def _details(job: Job) -> dict[str, Any]:
+    return {"warnings": list(SESSIONS.newest.warnings)} if job.engine == REBOUND else {}
 
 
 def _configure(scene, job: Job) -> None:

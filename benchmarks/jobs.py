@@ -24,18 +24,19 @@ class Job:
     """One thing that Blender does with a file: a picture, or with ``engine`` "" a snapshot of the scene.
 
     ``cold``: the engine's first picture in its process; its time has shaders compiled and geometry read in it.
-    ``camera``: where the camera stands instead, (4, 4) by rows.
+    ``camera``: where the camera stands instead, (4, 4) by rows. ``staged``: given what it lacks to be rendered.
     """
 
     blend: str
     engine: str = ""
     samples: int = 1
-    size: tuple[int, int] | None = None  # None: the file's own
+    size: tuple[int, int] | None = None  # None: the file's own; a height of 0: by the file's aspect
     bounces: int = 8
     cold: bool = False
     runs: int = 1
     camera: list[list[float]] | None = None
     settings: dict[str, Any] = field(default_factory=dict)  # of scene.rebound
+    staged: bool = False
 
     @property
     def is_kept(self) -> bool:
@@ -47,6 +48,8 @@ class Job:
         values = asdict(replace(self, blend="", runs=1)) | {"blender": blender, "content": _content(self.blend)}
         if self.engine != CYCLES:
             values.pop("bounces")
+        if not self.staged:
+            values.pop("staged")
         digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:12]
         what = f"{self.engine.lower()}-{self.samples}{'-first' if self.cold else ''}" if self.engine else "scene"
         return f"{Path(self.blend).stem}-{what}-{digest}"

@@ -193,6 +193,7 @@ class Material:
     roughness: float = 0.5  # 0..1, the square root of GGX's alpha
     layered: float = 1.0  # 0..1: how much of ``specular`` lies over the diffuse part and takes its light from it
     passing: float = 0.0  # 0..1: of light that goes on through it; above 0 only with a graph
+    passes_lamps: bool = True  # whether lamps and suns light what is behind it, as far as it lets light pass
     base_color_texture: Texture | None = None  # the image that the graph lays on as its base colour
     graph: FilledGraph | None = None  # what it is drawn by; None: it is the same all over
     index: int = 0  # its pass index, which Object Info tells

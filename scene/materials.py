@@ -73,6 +73,7 @@ class MaterialTable:
             base_color_texture=look.texture,
             graph=None if look.is_exact else filled,
             index=material.pass_index,
+            passes_lamps=material.use_transparent_shadow,
         )
 
     def _mean(self, image: Hashable) -> Array:

@@ -120,7 +120,7 @@ class DirectLight:
         for done, tile in enumerate(stale):
             target, viewport = self.maps.begin(tile, gpu_scene)
             draws = visible_draws(gpu_scene, Visibility.SHADOW, tile.face.sees)
-            passing = [gpu_scene.lets_pass(draw.material) for draw in draws]
+            passing = [gpu_scene.lets_lamps_pass(draw.material) for draw in draws]
             face = {
                 "pc_clip_from_world": tile.face.clip_from_world,
                 "pc_perspective": int(tile.face.perspective),

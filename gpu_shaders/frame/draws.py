@@ -38,19 +38,21 @@ def draw_scene(
     each: Callable[[Draw], Mapping[str, Any]] = lambda draw: {},
     viewport: Viewport | None = None,
     state: DrawState = OPAQUE,
+    lets_pass: Callable[[int], bool] | None = None,
     **shared: Any,
 ) -> None:
     """Draw, with depth test unless ``state`` says otherwise. ``each`` gives what the shader wants to know of a draw
-    beside its instances and, if it asks for materials, its material.
+    beside its instances and, if it asks for materials, its material. ``lets_pass``: what light goes through, by the
+    material's index; all that is transparent if it is not given.
     """
     shared["instance_tx"] = gpu_scene.instance_table
-    asks = "material_tx" in shader.samplers
+    asks, passes = "material_tx" in shader.samplers, lets_pass or gpu_scene.lets_pass
     if asks:
         shared["material_tx"] = gpu_scene.material_table
     programs: dict[Shader, list[Draw]] = defaultdict(list)
     for draw in draws:
         code = gpu_scene.code_of(draw.material) if asks else None
-        programs[material_program(shader, code, asks and gpu_scene.lets_pass(draw.material))].append(draw)
+        programs[material_program(shader, code, asks and passes(draw.material))].append(draw)
     for program, members in programs.items():
         common = shared | (gpu_scene.material_inputs(program) if asks else {})
         with device.drawing(program, target, state=state, viewport=viewport, **common) as draw_call:

@@ -122,6 +122,7 @@ class ReflectiveShadowMaps(LightMaps):
             draws,
             each,
             viewport,
+            lets_pass=gpu_scene.lets_lamps_pass,
             light_tx=self.light_table,
             pc_clip_from_world=tile.face.clip_from_world,
             pc_light=tile.light,
