@@ -115,6 +115,7 @@ def _configure(scene, job: Job) -> None:
     scene.render.engine = {CYCLES: "CYCLES", EEVEE: eevee, REBOUND: rebound.ENGINE_ID}[job.engine]
     scene.render.use_compositing = scene.render.use_sequencer = False
     for layer in scene.view_layers:
+        layer.use = layer.use or len(scene.view_layers) == 1
         for name in PASSES:
             setattr(layer, name, True)
     if job.engine == CYCLES:

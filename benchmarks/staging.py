@@ -1,4 +1,4 @@
-"""What a file lacks to be rendered: somebody to wear its materials, a camera, a light. Run inside Blender by the worker.
+"""What a file lacks to be rendered: somebody to wear its materials, a camera, a light. Runs inside Blender.
 
 A library of materials has no objects and an exchange file often no camera; every engine is given the same stage.
 """
@@ -18,7 +18,7 @@ SHAPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "V
 
 
 def stage(scene) -> None:
-    """Give ``scene`` what it lacks. A file with a camera is rendered as it is, but for a panorama, which Rebound has not."""
+    """Give ``scene`` what it lacks. A file with a camera is rendered as it is, but no panorama: Rebound has none."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     if scene.camera is not None:
         if scene.camera.type == "CAMERA" and scene.camera.data.type == "PANO":

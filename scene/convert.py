@@ -15,13 +15,13 @@ from .images import ImageReader, OnMainThread
 from .lights import read_light
 from .materials import MaterialTable
 from .meshes import content_key, mesh_key, read_mesh
+from .random_ids import object_random
 from .transfers import TransferReader
 from .world import read_world
 
 # Not among them: grease pencil, which Blender itself draws over any engine's picture.
 UNSHOWN_TYPES = {"VOLUME": "volumes"}
 SHOWN_TYPES = {"MESH", "LIGHT", "CURVES", "POINTCLOUD"}
-MOST_RANDOM_ID = 0xFFFFFFFF
 
 
 def _receives_bounce(obj) -> bool:
@@ -215,7 +215,7 @@ class SceneReader:
             self.transfers.add(obj, key)
         told: dict = {}
         if self.materials.asked(worn)[1]:
-            told = {"color": tuple(obj.color), "index": obj.pass_index, "random": instance.random_id / MOST_RANDOM_ID}
+            told = {"color": tuple(obj.color), "index": obj.pass_index, "random": object_random(instance)}
         old = self.before.get(key)
         same = old is not None and old.mesh == mesh.key and old.materials == slots and old.visibility is visibility
         same = same and all(getattr(old, name) == value for name, value in told.items())

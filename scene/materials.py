@@ -10,7 +10,7 @@ import numpy as np
 from ..gpu_shaders.materials import generate
 from .data import Array, Material
 from .images import ImageReader
-from .node_graph import FilledGraph, Input, ReadGraph, Slot
+from .node_graph import FilledGraph, Input, Link, Node, ReadGraph, Slot
 from .node_look import Look, look_of
 from .node_reader import read_graph
 from .nodes import active_output, find_input, node_tree, source
@@ -95,16 +95,33 @@ def _fields(look: Look) -> dict:
 
 GLASS = "what is refracted passes straight on"
 SUBSURFACE = "subsurface scattering is shown as diffuse"
+SHEEN = "sheen is shown as diffuse, without its rim"
 # What is shown as something near it: nodes, and inputs of the Principled BSDF that are not 0.
 APPROXIMATED_NODES = {
     "ShaderNodeBsdfGlass": GLASS,
     "ShaderNodeBsdfRefraction": GLASS,
     "ShaderNodeSubsurfaceScattering": SUBSURFACE,
+    "ShaderNodeBsdfTranslucent": "translucent light is shown as diffuse",
+    "ShaderNodeBsdfToon": "toon shading is soft",
+    "ShaderNodeBsdfSheen": SHEEN,
+    "ShaderNodeBevel": "edges are not bevelled",
+    "ShaderNodeAmbientOcclusion": "a material's ambient occlusion is that of an open place",
+    "ShaderNodeWireframe": "no wires are shown",
+    "ShaderNodeTangent": "tangents do not follow UV maps",
+    "ShaderNodeHairInfo": "Curves Info tells of no strand",
+    "ShaderNodeParticleInfo": "Particle Info tells a random number and the place only",
+    "ShaderNodePointInfo": "Point Info tells a random number and the place only",
+}
+# Outputs of nodes that tell more than that.
+APPROXIMATED_OUTPUTS = {
+    ("ShaderNodeNewGeometry", "Pointiness"): "pointiness is that of a flat place",
+    ("ShaderNodeNewGeometry", "Random Per Island"): "islands of a mesh share one random number",
+    ("ShaderNodeNewGeometry", "Parametric"): "parametric coordinates are 0",
 }
 APPROXIMATED_INPUTS = {
     "Transmission Weight": GLASS,
     "Subsurface Weight": SUBSURFACE,
-    "Sheen Weight": "sheen is shown as diffuse, without its rim",
+    "Sheen Weight": SHEEN,
     "Coat Weight": "a coat and what it covers share one lobe",
     "Anisotropic": "highlights are round, not anisotropic",
     "Thin Film Thickness": "thin films are not shown",
@@ -113,9 +130,13 @@ APPROXIMATED_INPUTS = {
 
 def _approximations(read: ReadGraph, material) -> list[str]:
     """Lines for what of a material is shown as something near it, each once."""
-    found = []
-    for node in read.filled.graph.nodes:
-        found += [APPROXIMATED_NODES[node.kind]] if node.kind in APPROXIMATED_NODES else []
+    found, nodes = [], read.filled.graph.nodes
+    for node in nodes:
+        if node.kind in APPROXIMATED_NODES and not _is_right(node):
+            found.append(APPROXIMATED_NODES[node.kind])
+        for link in (given.source for given in node.inputs if isinstance(given.source, Link)):
+            output = nodes[link.node].kind, link.output
+            found += [APPROXIMATED_OUTPUTS[output]] if output in APPROXIMATED_OUTPUTS else []
         if node.kind == "ShaderNodeBsdfPrincipled":
             found += [
                 APPROXIMATED_INPUTS[given.name]
@@ -128,6 +149,11 @@ def _approximations(read: ReadGraph, material) -> list[str]:
     if displacement and source(displacement).socket.is_output and material.displacement_method != "BUMP":
         found.append("displacement is shown as a bump")
     return list(dict.fromkeys(found))
+
+
+def _is_right(node: Node) -> bool:
+    """Whether a node of those kinds is used in a way that is exact."""
+    return node.kind == "ShaderNodeTangent" and node.option("direction_type") != "UV_MAP"
 
 
 def _is_zero(given: Input, filled: FilledGraph) -> bool:

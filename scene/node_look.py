@@ -16,6 +16,7 @@ from .node_graph import COLOR, FLOAT, SHADER, TABLE_SIZE, FilledGraph, Input, Li
 
 # What Schlick's Fresnel term adds to a black F0, averaged over all directions of even light.
 MEAN_FRESNEL = 1.0 / 21.0
+SHEEN = 0.1  # what it reflects of even light at its default roughness
 LARGEST_F0 = 0.98  # of a dielectric: IOR 200
 UNKNOWN = 0.5  # what a node makes whose mathematics are left to the GPU
 LEAST_GUESS, MOST_GUESS = 0.05, 0.95  # of a factor that is not constant
@@ -238,6 +239,28 @@ def _diffuse(_node: Node, given: Inputs) -> Look:
     return Look(given["Color"].rgb)
 
 
+def _sheen(_node: Node, given: Inputs) -> Look:
+    return Look(SHEEN * given["Color"].rgb)
+
+
+def _toon(node: Node, given: Inputs) -> Look:
+    if node.option("component") != "GLOSSY":
+        return _diffuse(node, given)
+    return _glossy(node, {"Color": given["Color"], "Roughness": given["Size"]})
+
+
+def _specular(_node: Node, given: Inputs) -> Look:
+    alpha = 1.0 - given["Transparency"].factor
+    return Look(
+        alpha * given["Base Color"].rgb,
+        alpha * np.maximum(given["Emissive Color"].rgb, 0.0),
+        specular=alpha * np.clip(given["Specular"].rgb, 0.0, 1.0),
+        roughness=given["Roughness"].factor,
+        passing=1.0 - alpha,
+        is_exact=alpha == 1.0 and given["Clear Coat"].is_exact and not given["Clear Coat"].number,
+    )
+
+
 def _emission(_node: Node, given: Inputs) -> Look:
     return Look(emission=given["Color"].rgb * given["Strength"].number)
 
@@ -270,6 +293,10 @@ def _transparent(_node: Node, given: Inputs) -> Look:
 _SHADERS: dict[str, Callable[[Node, Inputs], Look]] = {
     "ShaderNodeBsdfPrincipled": _principled,
     "ShaderNodeBsdfDiffuse": _diffuse,
+    "ShaderNodeBsdfTranslucent": _diffuse,
+    "ShaderNodeBsdfToon": _toon,
+    "ShaderNodeBsdfSheen": _sheen,
+    "ShaderNodeEeveeSpecular": _specular,
     "ShaderNodeSubsurfaceScattering": _diffuse,
     "ShaderNodeEmission": _emission,
     "ShaderNodeBsdfAnisotropic": _glossy,

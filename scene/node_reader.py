@@ -73,6 +73,8 @@ def read_graph(
         if socket:
             reader.read_inputs_first(socket)
         surface = reader.source(socket, SHADER).source if socket else None
+        if output and surface is None and reader.has_volume(output):
+            surface = reader.transparent()
     if isinstance(surface, Slot) and socket and socket.socket.is_linked:
         surface = reader.constant(surface)
     link = surface if isinstance(surface, Link) else None
@@ -167,7 +169,7 @@ class _Reader:
     def _constant(self, socket: Socket, found: Socket) -> Slot | Link | Place | None:
         node, own = socket.node, found.socket == socket.socket
         name = socket.socket.identifier
-        if own and name in NORMALS:
+        if own and name in NORMALS and node.bl_idname != "ShaderNodeNormal":
             return self._normal
         if own and name == "Vector" and node.bl_idname.startswith("ShaderNodeTex"):
             if node.bl_idname == "ShaderNodeTexEnvironment":
@@ -221,6 +223,8 @@ class _Reader:
         extra, options = self._properties(node)
         if node.bl_idname == "ShaderNodeTexVoronoi" and bpy.app.version < (5, 0, 0):
             options.append(("float_hash", True))  # its cells lay elsewhere
+        if node.bl_idname == "ShaderNodeNormal":  # which keeps its number in its output
+            extra.append(("direction", self._slot(node.outputs["Normal"])))
         if table is not None:
             rows, low, high, extended = table
             extra += [("low", self.values.add(FLOAT, (low,))), ("high", self.values.add(FLOAT, (high,)))]
@@ -234,7 +238,7 @@ class _Reader:
             for s in node.inputs
             if s.enabled and s.type in TYPES and s.identifier != "Weight"
         ]
-        inputs += [Input(name, FLOAT, slot) for name, slot in extra]
+        inputs += [Input(name, slot.type, slot) for name, slot in extra]
         outputs = tuple((s.identifier, TYPES[s.type]) for s in node.outputs if s.enabled and s.type in TYPES)
         self.nodes.append(Node(node.bl_idname, tuple(inputs), outputs, tuple(options), table, image))
         return len(self.nodes) - 1
@@ -299,6 +303,21 @@ class _Reader:
         one = Input("Alpha", FLOAT, self.values.add(FLOAT, (1.0,)))
         self.nodes.append(Node("Plain", (color, one), (("Color", COLOR), ("Alpha", FLOAT))))
         return len(self.nodes) - 1
+
+    def has_volume(self, output) -> bool:
+        """Whether a material is nothing but a volume, whose surface is not seen."""
+        volume = find_input(output, "Volume")
+        found = self._follow(volume)[0] if volume else None
+        if found is None or not found.socket.is_output:
+            return False
+        self._name(found.node, "is a volume, nothing is drawn")
+        return True
+
+    def transparent(self) -> Link:
+        """A shader that lets everything pass."""
+        white = Input("Color", COLOR, self.values.add(COLOR, (1.0, 1.0, 1.0)))
+        self.nodes.append(Node("ShaderNodeBsdfTransparent", (white,), (("BSDF", SHADER),)))
+        return Link(len(self.nodes) - 1, "BSDF")
 
     # What cannot be read
 

@@ -13,6 +13,11 @@ struct Surface {
   float coverage;    /* 0..1: of light that does not pass on */
 };
 
+/* A surface that lets everything pass and yet sends light, as Add Shader makes it, is met in so many samples all the same:
+ * what it sends is right on average, and what is behind it loses that part. */
+const float SURFACE_NO_COVERAGE = 0.01;
+const float SURFACE_ADDED_COVERAGE = 0.125;
+
 struct MaterialPlace {
   vec3 position;
   vec3 normal;    /* unit, shading, on the viewer's side; material_evaluate() bends it */
@@ -35,6 +40,11 @@ Surface surface_toward(Surface surface, float cosine)
   surface.albedo = surface.diffuse * left;
   vec3 passing = surface.transparent + surface.transmission * left;
   surface.coverage = 1.0 - clamp((passing.r + passing.g + passing.b) / 3.0, 0.0, 1.0);
+  vec3 kept = surface.albedo + surface.specular;
+  bool glows = surface.emission != vec3(0.0);
+  if (surface.coverage < SURFACE_NO_COVERAGE && (glows || max(kept.r, max(kept.g, kept.b)) > SURFACE_NO_COVERAGE)) {
+    surface.coverage = SURFACE_ADDED_COVERAGE;
+  }
   return surface;
 }
 

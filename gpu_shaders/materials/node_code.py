@@ -43,6 +43,7 @@ _GEOMETRY = Code(
     {
         "Position": "point.position", "Normal": "point.normal", "Tangent": "point.tangent",
         "True Normal": "point.geometric_normal", "Incoming": "point.incoming", "Backfacing": "point.backfacing",
+        "Pointiness": "0.5", "Random Per Island": "point.object_random", "Parametric": "vec3(0.0)",
     }
 )  # fmt: skip
 _OBJECT = Code(
@@ -84,6 +85,41 @@ def _attribute(node: Node) -> Code:
     }
     return Code(outputs, attributes={"named": named})
 
+
+# What a surface is not told about itself is what it would be in the plainest case: a flat place, no wire, not of hair.
+_BEVEL = Code({"Normal": "{Normal}"})
+_OCCLUSION = Code({"Color": "{Color}", "AO": "1.0"})
+_WIREFRAME = Code({"Fac": "0.0"})
+_HAIR_INFO = Code(
+    {
+        **dict.fromkeys(("Is Strand", "Intercept", "Length", "Thickness"), "0.0"),
+        "Tangent Normal": "point.tangent", "Random": "point.object_random",
+    }
+)  # fmt: skip
+_PARTICLE_INFO = Code(
+    {
+        **dict.fromkeys(("Index", "Age", "Lifetime", "Size"), "0.0"), "Random": "point.object_random",
+        "Location": "point.object_location", "Velocity": "vec3(0.0)", "Angular Velocity": "vec3(0.0)",
+    }
+)  # fmt: skip
+_POINT_INFO = Code({"Position": "point.position", "Radius": "0.0", "Random": "point.object_random"})
+
+
+def _tangent(node: Node) -> Code:
+    if node.option("direction_type") == "UV_MAP":
+        return Code({"Tangent": "point.tangent"})
+    call = f"vector_around_{str(node.option('axis')).lower()}(point.generated - 0.5)"
+    around = f"vector_transform_normal({call}, point.world_from_object)"
+    return Code({"Tangent": f"vector_normalize(cross(point.normal, cross({around}, point.normal)))"}, ("vector",))
+
+
+# As far as the camera is what light fell off on its way to; what is not seen from it is told no distance.
+_LIGHT_FALLOFF = Code(
+    {"Quadratic": "{v}_k", "Linear": "{v}_k * {v}_far", "Constant": "{v}_k * {v}_far * {v}_far"},
+    (),
+    "float {v}_far = point.camera_ray > 0.0 ? length(point.camera_position) : 1.0; "
+    "float {v}_k = {Strength} * ({Smooth} > 0.0 ? {v}_far * {v}_far / ({Smooth} + {v}_far * {v}_far) : 1.0);",
+)
 
 _CAMERA = Code(
     {
@@ -152,11 +188,29 @@ def _metallic(node: Node) -> Code:
     return Code({"BSDF": f"surface_metal({color}, {{Roughness}}, {{Normal}})"}, ("surface",))
 
 
+def _toon(node: Node) -> Code:
+    glossy = node.option("component") == "GLOSSY"
+    call = "surface_glossy({Color}, {Size}, {Normal})" if glossy else "surface_diffuse({Color}, {Normal})"
+    return Code({"BSDF": call}, ("surface",))
+
+
 _DIFFUSE = Code({"BSDF": "surface_diffuse({Color}, {Normal})"}, ("surface",))
+_SHEEN = Code({"BSDF": "surface_diffuse({Color} * SURFACE_SHEEN, {Normal})"}, ("surface",))
+_SPECULAR = Code(
+    {
+        "BSDF": "surface_specular({Base Color}, {Specular}, {Roughness}, {Emissive Color}, {Transparency}, {Normal}, "
+        "{Clear Coat}, {Clear Coat Roughness})"
+    },
+    ("surface",),
+)
 
 _CODE: dict[str, Code | Callable[[Node], Code]] = {
     "ShaderNodeBsdfPrincipled": _PRINCIPLED,
     "ShaderNodeBsdfDiffuse": _DIFFUSE,
+    "ShaderNodeBsdfTranslucent": _DIFFUSE,
+    "ShaderNodeBsdfToon": _toon,
+    "ShaderNodeBsdfSheen": _SHEEN,
+    "ShaderNodeEeveeSpecular": _SPECULAR,
     "ShaderNodeSubsurfaceScattering": Code({"BSSRDF": "surface_diffuse({Color}, {Normal})"}, ("surface",)),
     "ShaderNodeBsdfAnisotropic": Code({"BSDF": "surface_glossy({Color}, {Roughness}, {Normal})"}, ("surface",)),
     "ShaderNodeBsdfMetallic": _metallic,
@@ -235,6 +289,22 @@ _CODE: dict[str, Code | Callable[[Node], Code]] = {
     "ShaderNodeVectorTransform": _vector_transform,
     "ShaderNodeNormalMap": _normal_map,
     "ShaderNodeBump": _bump,
+    "ShaderNodeNormal": Code(
+        {
+            "Normal": "vector_normalize({direction})",
+            "Dot": "dot(vector_normalize({direction}), vector_normalize({Normal}))",
+        },
+        ("vector",),
+    ),
+    "ShaderNodeTangent": _tangent,
+    "ShaderNodeBevel": _BEVEL,
+    "ShaderNodeAmbientOcclusion": _OCCLUSION,
+    "ShaderNodeWireframe": _WIREFRAME,
+    "ShaderNodeHairInfo": _HAIR_INFO,
+    "ShaderNodeParticleInfo": _PARTICLE_INFO,
+    "ShaderNodePointInfo": _POINT_INFO,
+    "ShaderNodeLightFalloff": _LIGHT_FALLOFF,
+    "ShaderNodeSqueeze": Code({"Value": "1.0 / (1.0 + exp(-({Value} - {Center}) * {Width}))"}),
     "ShaderNodeUVMap": _uv_map,
     "ShaderNodeVertexColor": _color_attribute,
     "ShaderNodeAttribute": _attribute,

@@ -177,8 +177,29 @@ MaterialSurface surface_over(MaterialSurface s, float alpha, vec3 emission, vec3
 {
   alpha = clamp(alpha, 0.0, 1.0);
   s.emission = alpha * emission;
-  s.diffuse += alpha * SURFACE_SHEEN * max(sheen, 0.0);
+  vec3 added = SURFACE_SHEEN * clamp(sheen, 0.0, 1.0);
+  /* Sheen lies over the rest and leaves it less, by its greatest channel. */
+  float left = 1.0 - max(added.r, max(added.g, added.b));
+  s.diffuse = left * s.diffuse + alpha * added;
+  s.specular *= left;
   s.coat = alpha * clamp(coat, 0.0, 1.0) * surface_dielectric(coat_ior);
+  s.coat_roughness = clamp(coat_roughness, 0.0, 1.0);
+  return s;
+}
+
+/* EEVEE's Specular BSDF: `specular` is the reflectance at normal incidence. */
+MaterialSurface surface_specular(vec3 base, vec3 specular, float roughness, vec3 emission, float transparency,
+                                 vec3 normal, float coat, float coat_roughness)
+{
+  MaterialSurface s = surface_black(normal);
+  float alpha = 1.0 - clamp(transparency, 0.0, 1.0);
+  s.diffuse = alpha * max(base, 0.0);
+  s.specular = alpha * clamp(specular, 0.0, 1.0);
+  s.layer = s.specular;
+  s.roughness = clamp(roughness, 0.0, 1.0);
+  s.emission = alpha * emission;
+  s.transparent = vec3(1.0 - alpha);
+  s.coat = alpha * clamp(coat, 0.0, 1.0) * surface_dielectric(1.5);
   s.coat_roughness = clamp(coat_roughness, 0.0, 1.0);
   return s;
 }

@@ -111,3 +111,19 @@ vec3 vector_transform_normal(vec3 normal, mat4 matrix)
 {
   return vector_normalize(transpose(inverse(mat3(matrix))) * normal);
 }
+
+/* Directions around an axis through the middle of an object, at a place from there: a Tangent node's. */
+vec3 vector_around_x(vec3 p)
+{
+  return vec3(0.0, -p.z, p.y);
+}
+
+vec3 vector_around_y(vec3 p)
+{
+  return vec3(-p.z, 0.0, p.x);
+}
+
+vec3 vector_around_z(vec3 p)
+{
+  return vec3(-p.y, p.x, 0.0);
+}

@@ -31,3 +31,28 @@ def test_transparent_shadows_are_the_materials_choice(sheet, tmp_path, passes, w
     sheet.use_transparent_shadow = passes
     found = picture(render(bpy.context.scene, tmp_path / "sheet.exr"))
     assert found[..., :3].mean() == pytest.approx(0.8 * wanted, abs=0.02)  # the floor's colour, of a sun of pi W/m2
+
+
+def test_light_that_is_added_to_a_transparent_sheet_is_seen(sheet, tmp_path):
+    tree, scene = sheet.node_tree, bpy.context.scene
+    tree.nodes.clear()
+    made = {kind: tree.nodes.new(f"ShaderNode{kind}") for kind in ("BsdfTransparent", "Emission", "AddShader")}
+    made["Emission"].inputs["Strength"].default_value = 0.5
+    tree.links.new(made["BsdfTransparent"].outputs[0], made["AddShader"].inputs[0])
+    tree.links.new(made["Emission"].outputs[0], made["AddShader"].inputs[1])
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(made["AddShader"].outputs[0], output.inputs["Surface"])
+    scene.camera.location.z, scene.rebound.samples = 5, 64
+    bpy.data.objects["Sun"].hide_render = True
+    found = picture(render(scene, tmp_path / "glow.exr"))
+    assert found[..., :3].mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_volume_without_a_surface_hides_nothing(sheet, tmp_path):
+    tree, scene = sheet.node_tree, bpy.context.scene
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(tree.nodes.new("ShaderNodeVolumeAbsorption").outputs[0], output.inputs["Volume"])
+    scene.camera.location.z = 5
+    found = picture(render(scene, tmp_path / "fog.exr"))
+    assert found[..., :3].mean() == pytest.approx(0.8, abs=0.02)

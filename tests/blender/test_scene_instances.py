@@ -7,7 +7,8 @@ import pytest
 from rebound.scene.changes import Changes
 from rebound.scene.convert import convert_scene
 from rebound.scene.data import Visibility
-from rebound.tests.support.blender_build import CUBE, collection, convert, link, mesh, scatter_nodes
+from rebound.tests.support.blender_build import CUBE, collection, convert, link, mesh, scatter_nodes, shader_material
+from rebound.tests.support.engine_build import picture, render
 from rebound.tests.support.probe_engine import probe_engine
 
 pytestmark = pytest.mark.usefixtures("clean_scene")
@@ -295,3 +296,25 @@ def test_second_final_render_matches_the_first():
     scatter_nodes(link("Host", mesh()))
     first, second = final_scene(), final_scene()
     assert keys(first) == keys(second) and places(first) == places(second)
+
+
+def test_random_numbers_of_objects_are_those_of_cycles(clean_scene, tmp_path):
+    """Object Info's Random of an object, by its name, and of an instance."""
+    scene = clean_scene
+    made, emission = shader_material("Random", "ShaderNodeEmission")
+    info = made.node_tree.nodes.new("ShaderNodeObjectInfo")
+    made.node_tree.links.new(info.outputs["Random"], emission.inputs["Strength"])
+    data = mesh("Random")
+    data.materials.append(made)
+    cells = [link("Tree.001", data, location=(0, 0, 0)), link("Hütte", data, location=(4, 0, 0))]
+    inside = collection("Inside", data)
+    cells.append(link("Instancer", None, location=(8, 0, 0), instance_type="COLLECTION", instance_collection=inside))
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.ortho_scale = "ORTHO", 12
+    scene.camera = link("Camera", camera, location=(4, 0, 5))
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1, False
+    scene.render.resolution_x, scene.render.resolution_y = 120, 40
+    truth = picture(render(scene, tmp_path / "random.exr"))[20, [20, 60, 100], 0]
+    found = sorted(convert().instances, key=lambda i: i.world_from_object[0, 3])
+    np.testing.assert_allclose([i.random for i in found], truth, atol=1e-5)
+    assert len(set(truth.tolist())) == 3

@@ -2,12 +2,14 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
 
 from rebound.gpu_shaders.materials import generate
+from rebound.gpu_shaders.materials.node_code import _CODE as NODE_CODE
 from rebound.scene.node_graph import Link, Place, Slot
 from rebound.scene.node_reader import read_graph
 from rebound.tests.support.material_programs import material_program
@@ -132,40 +134,91 @@ def test_a_groups_number_makes_a_colour_grey(tree):
 
 
 def test_unsupported_nodes_are_named_and_replaced(tree):
-    occlusion, info = tree.nodes.new("ShaderNodeAmbientOcclusion"), tree.nodes.new("ShaderNodeHairInfo")
-    occlusion.name, info.name = "Occlusion", "Hair"
-    tree.links.new(add(tree, "ShaderNodeTexNoise").outputs["Color"], occlusion.inputs["Color"])
+    moved, waves = tree.nodes.new("ShaderNodeDisplacement"), tree.nodes.new("ShaderNodeWavelength")
+    moved.name, waves.name = "Moved", "Waves"
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], moved.inputs["Normal"])
     mix = add(tree, "ShaderNodeMixRGB", Fac=0.3)
-    tree.links.new(occlusion.outputs["Color"], by_identifier(mix.inputs, "Color1"))
-    tree.links.new(info.outputs["Length"], by_identifier(mix.inputs, "Fac"))
+    tree.links.new(moved.outputs["Displacement"], by_identifier(mix.inputs, "Color1"))
+    tree.links.new(waves.outputs["Color"], by_identifier(mix.inputs, "Fac"))
     emit(tree, mix.outputs[0])
     found = read()
     assert found.unsupported == (
-        "node 'Hair' is not supported, the socket's own value is shown",
-        "node 'Occlusion' is not supported, its input 'Color' is passed on",
+        "node 'Waves' is not supported, the socket's own value is shown",
+        "node 'Moved' is not supported, its input 'Normal' is passed on",
     )
     mixed = next(n for n in found.filled.graph.nodes if n.kind == "ShaderNodeMixRGB")
     given = {entry.name: entry.source for entry in mixed.inputs}
     assert isinstance(given["Color1"], Link) and found.filled.table.ravel()[given["Fac"].index] == pytest.approx(0.3)
 
 
-def test_an_output_that_is_not_supported_is_named(tree):
-    geometry, mix = tree.nodes.new("ShaderNodeNewGeometry"), add(tree, "ShaderNodeMixRGB", Fac=0.3)
-    tree.links.new(geometry.outputs["Pointiness"], by_identifier(mix.inputs, "Fac"))
-    tree.links.new(geometry.outputs["Position"], by_identifier(mix.inputs, "Color1"))
+def test_an_output_that_is_not_supported_is_named(tree, monkeypatch):
+    place, mix = tree.nodes.new("ShaderNodeTexCoord"), add(tree, "ShaderNodeMixRGB", Fac=0.3)
+    place.name = "Place"
+    whole = NODE_CODE["ShaderNodeTexCoord"]
+    monkeypatch.setitem(NODE_CODE, "ShaderNodeTexCoord", replace(whole, outputs={"UV": whole.outputs["UV"]}))
+    tree.links.new(place.outputs["Camera"], by_identifier(mix.inputs, "Fac"))
+    tree.links.new(place.outputs["UV"], by_identifier(mix.inputs, "Color1"))
     emit(tree, mix.outputs[0])
     found = read()
-    assert found.unsupported == ("node 'Geometry' does not give 'Pointiness', the socket's own value is shown",)
-    assert "point.position" in generate(found.filled.graph).text
+    assert found.unsupported == ("node 'Place' does not give 'Camera', the socket's own value is shown",)
+    assert "point.uv" in generate(found.filled.graph).text
 
 
 def test_an_unsupported_shader_is_diffuse_of_its_colour(tree):
-    toon, output = add(tree, "ShaderNodeBsdfToon", Color=COLOR), tree.nodes.new("ShaderNodeOutputMaterial")
-    toon.name = "Toon"
-    tree.links.new(toon.outputs[0], output.inputs["Surface"])
+    hair, output = add(tree, "ShaderNodeBsdfHair", Color=COLOR), tree.nodes.new("ShaderNodeOutputMaterial")
+    hair.name = "Hair"
+    tree.links.new(hair.outputs[0], output.inputs["Surface"])
     found = read()
     assert [n.kind for n in found.filled.graph.nodes] == ["ShaderNodeBsdfDiffuse"]
-    assert found.unsupported == ("node 'Toon' is not supported, it is shown as diffuse",)
+    assert found.unsupported == ("node 'Hair' is not supported, it is shown as diffuse",)
+
+
+@pytest.mark.parametrize(
+    ("kind", "socket", "text"),
+    [
+        ("ShaderNodeAmbientOcclusion", "AO", "= 1.0;"),
+        ("ShaderNodeBevel", "Normal", "= point.normal;"),
+        ("ShaderNodeWireframe", "Fac", "= 0.0;"),
+        ("ShaderNodeNewGeometry", "Pointiness", "= 0.5;"),
+        ("ShaderNodeNewGeometry", "Random Per Island", "= point.object_random;"),
+        ("ShaderNodeHairInfo", "Random", "= point.object_random;"),
+        ("ShaderNodeParticleInfo", "Size", "= 0.0;"),
+        ("ShaderNodeTangent", "Tangent", "vector_around_z"),
+        ("ShaderNodeLightFalloff", "Linear", "length(point.camera_position)"),
+        ("ShaderNodeNormal", "Dot", "dot(vector_normalize("),
+    ],
+)
+def test_what_a_surface_is_not_told_is_the_plainest_case(tree, kind, socket, text):
+    emit(tree, tree.nodes.new(kind).outputs[socket])
+    found = read()
+    assert found.unsupported == () and text in generate(found.filled.graph).text
+
+
+def test_a_normal_node_keeps_its_direction_in_its_output(tree):
+    node = tree.nodes.new("ShaderNodeNormal")
+    node.outputs["Normal"].default_value = (0.6, 0.0, 0.8)
+    emit(tree, node.outputs["Normal"])
+    found = read().filled
+    given = {entry.name: entry.source for entry in found.graph.nodes[0].inputs}
+    np.testing.assert_allclose(found.table.ravel()[given["direction"].index :][:3], (0.6, 0.0, 0.8), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "kind", ["BsdfTranslucent", "BsdfToon", "BsdfSheen", "EeveeSpecular", "BsdfDiffuse", "BsdfMetallic"]
+)
+def test_shaders_are_supported(tree, kind):
+    shader, output = tree.nodes.new(f"ShaderNode{kind}"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    found = read()
+    assert found.unsupported == () and found.filled.graph.nodes[-1].kind == f"ShaderNode{kind}"
+
+
+def test_a_volume_alone_has_no_surface(tree):
+    volume, output = tree.nodes.new("ShaderNodeVolumePrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    found = read()
+    assert [node.kind for node in found.filled.graph.nodes] == ["ShaderNodeBsdfTransparent"]
+    assert found.unsupported == ("node 'Principled Volume' is a volume, nothing is drawn",)
 
 
 def test_a_circle_of_links_ends(tree):
