@@ -6,6 +6,7 @@ A library of materials has no objects and an exchange file often no camera; ever
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import bpy
 from mathutils import Vector
@@ -19,7 +20,7 @@ SHAPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD", "V
 
 def stage(scene) -> None:
     """Give ``scene`` what it lacks. A file with a camera is rendered as it is, but no panorama: Rebound has none."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph: Any = bpy.context.evaluated_depsgraph_get()
     if scene.camera is not None:
         if scene.camera.type == "CAMERA" and scene.camera.data.type == "PANO":
             scene.camera.data.type = "PERSP"
@@ -37,13 +38,13 @@ def _wear(scene, materials: list) -> None:
     for place, material in enumerate(materials):
         row, column = divmod(place, columns)
         bpy.ops.mesh.primitive_uv_sphere_add(radius=1.0, location=(SPACING * column, 0.0, -SPACING * row))
-        ball = bpy.context.object
+        ball: Any = bpy.context.object
         bpy.ops.object.shade_smooth()
         ball.data.materials.append(material)
 
 
 def _light(scene) -> None:
-    light = bpy.data.lights.new("Stage", "SUN")
+    light: Any = bpy.data.lights.new("Stage", "SUN")
     light.energy, light.angle = SUN_STRENGTH, 0.1
     sun = bpy.data.objects.new("Stage", light)
     sun.rotation_euler = (0.7, 0.2, 0.5)
@@ -55,7 +56,7 @@ def _light(scene) -> None:
 
 def _camera(scene):
     """A camera that sees everything."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph: Any = bpy.context.evaluated_depsgraph_get()
     corners = [
         instance.matrix_world @ Vector(corner)
         for instance in depsgraph.object_instances
