@@ -351,3 +351,16 @@ def test_baked_objects_are_lit_by_their_bakes(saved, tmp_path):
     saved.rebound.transfer_use = False
     dark = picture(render(saved, tmp_path / "dark.exr"))
     assert dark[..., :3].mean() < 0.5 * found[..., :3].mean()
+
+
+def test_glossy_bakes_reflect_the_world(saved, tmp_path):
+    """A rough metal floor: what it mirrors of a grey world is as bright baked as live."""
+    bpy.data.lights["Spot"].energy = 0
+    shader = bpy.data.materials["Red"].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Metallic"].default_value, shader.inputs["Roughness"].default_value = 1.0, 0.8
+    saved.rebound.samples, saved.rebound.bake_directions, saved.rebound.bake_kind = 8, 256, "GLOSSY"
+    live = picture(render(saved, tmp_path / "live.exr"))[..., :3]
+    bpy.ops.rebound.bake_transfer(objects="ALL")
+    saved.rebound.method = "NONE"
+    found = picture(render(saved, tmp_path / "baked.exr"))[..., :3]
+    assert abs(found - live).mean() < 0.15 * live.mean()
