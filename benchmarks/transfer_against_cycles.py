@@ -1,9 +1,11 @@
 """Baked light against Cycles, into docs/prt.md.
 
-`.venv/bin/python benchmarks/transfer_against_cycles.py [SAMPLES] [PART ...]`, some minutes a part. Suzanne on a floor under panoramas that ship with Blender, as they stand and turned. Small pictures: with 64 samples a
-pixel, a cell of 4 x 4 that is compared has 1024. Parts are matt, shiny and sharp; those not named keep their last
-figures, in out/transfer_against_cycles.json. Errors are those of ``score.py`` over the pixels of the object, or of the
-shadow where that is what is looked at.
+`.venv/bin/python benchmarks/transfer_against_cycles.py [SAMPLES] [PART ...]`, some minutes a part. Parts are matt,
+shiny and sharp; those not named keep their last figures, in out/transfer_against_cycles.json.
+
+Suzanne on a floor under panoramas that ship with Blender, as they stand and turned. Small pictures: with 64 samples a
+pixel, a cell of 4 x 4 that is compared has 1024. Errors are those of ``score.py`` over the pixels of the object, or of
+the shadow where that is what is looked at.
 """
 
 from __future__ import annotations
@@ -14,8 +16,9 @@ import os
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
-import bpy
+import bpy as blender
 import numpy as np
 import OpenEXR
 from checkout import ROOT
@@ -27,6 +30,7 @@ from rebound.benchmarks.plot import Line, chart
 from rebound.benchmarks.score import cell_errors
 from rebound.benchmarks.tables import Table, significant
 
+bpy: Any = blender  # whose stubs know no node by its type
 PAGE, PICTURES = ROOT / "docs" / "prt.md", ROOT / "docs" / "images"
 RESULTS = ROOT / "out" / "transfer_against_cycles.json"
 # Radiance below which a surface of the last part is in the sun's shadow; in the light the floor has 0.4.
