@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from bisect import bisect_left
 from collections import Counter, defaultdict
 from collections.abc import Hashable
@@ -13,7 +14,11 @@ import numpy as np
 from .device.interface import Device, Texture, Vertices
 from .device.shader import Shader
 from .gpu_shaders.frame.environment import Environment
+from .gpu_shaders.frame.material_pass import material_program
+from .gpu_shaders.frame.reflective_shaders import REFLECT
+from .gpu_shaders.frame.shaders import GBUFFER, SHADOW_PASSING
 from .gpu_shaders.frame.structs import INSTANCE, MATERIAL, MATERIAL_VIEW
+from .gpu_shaders.frame.surface_points import SURFACE_POINT_DRAW
 from .gpu_shaders.frame.tables import replace_table
 from .gpu_shaders.materials import VALUE_WIDTH, Attribute, MaterialShader, generate
 from .scene.changes import Changes, told, world_boxes
@@ -61,6 +66,9 @@ class GpuScene:
         self._images: dict[Hashable, Texture] = {}
         self.environment = Environment(device)
         self._codes: tuple[MaterialShader | None, ...] = ()  # of each material
+        self._compiled: set[MaterialShader] = set()
+        self._unchecked = True  # whether the draws may have materials that were not asked for their programs
+        self.waits = False  # whether some materials are shown by their constants until their programs are compiled
         self._first_values: tuple[int, ...] = ()  # each material's first texel among the values
         self._view = np.zeros(0, np.float32)  # MATERIAL_VIEW of the camera
         self.instance_table: Texture | None = None
@@ -91,8 +99,8 @@ class GpuScene:
         drawn = [scene.materials[index] for index in {draw.material for draw in self.draws}]
         self.is_glossy = any(material.is_glossy for material in drawn)
         self.emits = any(any(material.emission) for material in drawn)
-        passing = [draw.bounds for draw in self.draws if self.lets_lamps_pass(draw.material)]
-        self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
+        self._unchecked = self._unchecked or changes.any
+        self._find_passing()
         if len(changes.moved_bounds):
             self._moved.append((self.revision, changes.moved_bounds, changes.shape_bounds))
             del self._moved[:-REMEMBERED_MOVES]
@@ -120,12 +128,58 @@ class GpuScene:
         self._view = MATERIAL_VIEW.pack([row], for_uniform=True)[0]
 
     def code_of(self, material: int) -> MaterialShader | None:
-        """What a material is drawn by; None where it is the same all over."""
-        return self._codes[material]
+        """What a material is drawn by; None where it is the same all over, or has to wait for its program."""
+        code = self._codes[material]
+        return None if self.waits and code not in self._compiled else code
 
     def lets_pass(self, material: int) -> bool:
         """Whether light may go on through a material."""
-        return self.scene.materials[material].passing > 0.0
+        return self.scene.materials[material].passing > 0.0 and self.code_of(material) is not None
+
+    def compile(self, seconds: float) -> bool:
+        """Compile programs of materials for about so long, the first that is not ready in any case.
+
+        What is not ready ``waits`` and is shown by its constants; True if something looks different now.
+        """
+        if not (self._unchecked or self.waits):
+            return False
+        missing: dict[MaterialShader, list[Draw]] = defaultdict(list)
+        for draw in self.draws:
+            code = self._codes[draw.material]
+            if code is not None and code not in self._compiled:
+                missing[code].append(draw)
+        waited, end = self.waits, time.perf_counter() + seconds
+        for code, draws in list(missing.items()):
+            for program in {program for draw in draws for program in self._programs_of(draw, code)}:
+                self.device.prepare(program)
+            self._compiled.add(code)
+            del missing[code]
+            if waited:
+                self._look_changed(draws)
+            if time.perf_counter() > end:
+                break
+        self.waits, self._unchecked = bool(missing), False
+        self._find_passing()
+        return waited
+
+    def _programs_of(self, draw: Draw, code: MaterialShader) -> list[Shader]:
+        passes = self.scene.materials[draw.material].passing > 0.0
+        drawn = (GBUFFER, REFLECT, SHADOW_PASSING) if passes else (GBUFFER, REFLECT)
+        return [
+            *(material_program(shader, code, passes) for shader in drawn),
+            material_program(SURFACE_POINT_DRAW, code),
+        ]
+
+    def _look_changed(self, draws: list[Draw]) -> None:
+        """Have light maps that see them drawn anew."""
+        self.revision += 1
+        boxes = np.array([draw.bounds for draw in draws])
+        self._moved.append((self.revision, boxes, boxes))
+        del self._moved[:-REMEMBERED_MOVES]
+
+    def _find_passing(self) -> None:
+        passing = [draw.bounds for draw in self.draws if self.lets_lamps_pass(draw.material)]
+        self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
 
     def lets_lamps_pass(self, material: int) -> bool:
         """Whether lamps light what is behind a material: Blender's Transparent Shadows."""
@@ -144,7 +198,7 @@ class GpuScene:
         """What such a program wants to know of a draw's material."""
         given: dict[str, Any] = {"pc_material": material}
         graph = self.scene.materials[material].graph
-        if graph is not None:
+        if graph is not None and self.code_of(material) is not None:
             given["pc_values"] = self._first_values[material]
             given |= {f"image_{k}_tx": self._images[key] for k, key in enumerate(graph.images)}
         return given

@@ -26,6 +26,8 @@ from .scene.follow import SceneFollower
 from .settings import VIEWPORT_SETTINGS, Settings, named_settings
 
 T = TypeVar("T")
+# In each redraw of a viewport; until the programs of all materials are there, some are shown by their constants.
+SECONDS_OF_COMPILING = 0.05
 
 
 @dataclass
@@ -72,8 +74,8 @@ class Picture:
         return self.samples + self._part
 
     def lacks(self, wanted: int) -> bool:
-        """True if it has fewer samples than that, or the newest one is still to be replaced."""
-        return self.samples < wanted or self.frame.provisional
+        """True if it has fewer samples than that, or what it shows is still to be replaced."""
+        return self.samples < wanted or self.frame.provisional or self.gpu_scene.waits
 
     def piece(self) -> bool:
         """Do one bounded piece of GPU work; True when that completed a sample."""
@@ -159,12 +161,14 @@ class Session:
         self.scene = Scene()
         self.status = Status()
         self._follower = SceneFollower()
+        self._in_viewport = False
         self._gpu: _Gpu | None = None
         self._picture: Picture | None = None
         SESSIONS.alive.add(self)
 
     def sync(self, depsgraph, *, for_viewport: bool, **options: Any) -> None:
         """Read the depsgraph: CPU work, on any thread. ``options`` are further ones of ``SceneFollower.read``."""
+        self._in_viewport = for_viewport
         self.scene = self._follower.read(depsgraph, for_viewport=for_viewport, **options)
         self.status.warnings = (*self.scene.warnings, *_missing(self.scene))
         self.status.error, self.status.bakes = "", self.scene.bakes
@@ -177,6 +181,8 @@ class Session:
         """
         gpu = self._ready()
         changed = gpu.upload(self.scene)
+        if self._in_viewport:
+            changed |= gpu.scene.compile(SECONDS_OF_COMPILING)
         old = self._picture
         if old and not changed and old.is_for(view, settings):
             return old

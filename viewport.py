@@ -64,7 +64,8 @@ class Viewport:
             picture.show(_split_place(depsgraph.scene.rebound.viewport_split_place, context.region, border))
         self._failed_for, self.error = None, ""
         self.unfinished = working and picture.lacks(wanted)
-        self.progress = f"Sample {picture.samples}/{wanted}"
+        waits = picture.gpu_scene.waits
+        self.progress = "Compiling materials" if waits else f"Sample {picture.samples}/{wanted}"
 
     def fail(self, message: str) -> None:
         """Show ``message`` until the next edit, which tries again from nothing."""

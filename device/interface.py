@@ -139,6 +139,11 @@ class Device(ABC):
         if x and y and z:
             self._dispatch(program, (x, y, z), resources)
 
+    def prepare(self, shader: Shader) -> None:
+        """Compile a shader ahead of its first use. Raises ShaderError."""
+        self._check_idle(shader)
+        self._program(shader)
+
     def clear(self, target: Target, color: Sequence = (0.0, 0.0, 0.0, 0.0), depth: float = 1.0, *,
               viewport: Viewport | None = None) -> None:  # fmt: skip
         """Fill all textures of a target, or the ``viewport`` of them. ``color``: RGBA, or a list of one RGBA a slot."""

@@ -105,6 +105,27 @@ def test_texture_lies_where_its_uv_map_says(studio):
     np.testing.assert_allclose(found["diffuse_color"], pixels.transpose(1, 0, 2), atol=1e-3)
 
 
+def test_material_is_shown_by_its_constants_until_it_is_compiled(studio):
+    """One program at a time when there is no time at all; what is ready has the maps drawn anew that see it."""
+    shown, _ = textured(closest=True, repeat=True)
+    image = shown.images["image"]
+    other = image_material("Other", image, closest=False)  # another graph
+    both = scene([shown.meshes[FLOOR.key], sphere("ball")], [], materials=[*shown.materials, other])
+    both = replace(both, images=shown.images)
+    studio.show(both)
+    gpu_scene = studio.gpu_scene
+
+    def ready():
+        return [gpu_scene.code_of(material) is not None for material in (0, 1)]
+
+    assert not gpu_scene.compile(0.0) and gpu_scene.waits and sum(ready()) == 1  # nothing was shown before
+    studio.render(both, ortho(4, 4, 4), 1)
+    before = gpu_scene.revision
+    assert gpu_scene.compile(0.0) and not gpu_scene.waits and all(ready())
+    moved = gpu_scene.moved_since(before)
+    assert moved is not None and len(moved) == 1 and not gpu_scene.compile(0.0)
+
+
 def test_bounce_takes_the_texture(studio):
     shown, pixels = textured(closest=True, repeat=True)
     shown = replace(shown, lights=(light("SUN", (0, 0, 1), power=2.0),))
