@@ -112,6 +112,7 @@ APPROXIMATED_NODES = {
     "ShaderNodeParticleInfo": "Particle Info tells a random number and the place only",
     "ShaderNodePointInfo": "Point Info tells a random number and the place only",
 }
+OTHER_LOBES = {"BECKMANN", "ASHIKHMIN_SHIRLEY"}
 # Outputs of nodes that tell more than that.
 APPROXIMATED_OUTPUTS = {
     ("ShaderNodeNewGeometry", "Pointiness"): "pointiness is that of a flat place",
@@ -134,6 +135,8 @@ def _approximations(read: ReadGraph, material) -> list[str]:
     for node in nodes:
         if node.kind in APPROXIMATED_NODES and not _is_right(node):
             found.append(APPROXIMATED_NODES[node.kind])
+        if dict(node.options).get("distribution") in OTHER_LOBES:
+            found.append("highlights have GGX's tails, not those of other distributions")
         for link in (given.source for given in node.inputs if isinstance(given.source, Link)):
             output = nodes[link.node].kind, link.output
             found += [APPROXIMATED_OUTPUTS[output]] if output in APPROXIMATED_OUTPUTS else []

@@ -14,6 +14,7 @@ import gpu
 
 from rebound.device.blender import BlenderDevice
 from rebound.gpu_shaders.materials import supported_kinds
+from rebound.scene.materials import APPROXIMATED_NODES
 from rebound.scene.node_reader import CONSTANTS
 from rebound.tests.support.node_cases import GROUPS, NodeCase
 from rebound.tests.support.node_sheet import deviations
@@ -53,11 +54,19 @@ def table(found: dict[str, list[tuple[NodeCase, float]]]) -> str:
     lines = ["| Node | Supported | Cases | Largest deviation |", "|---|---|---|---|"]
     for kind, label in sorted(kinds().items(), key=lambda item: item[1]):
         cases = found.get(kind, [])
-        supported = "yes" if kind in supported_kinds() or kind in CONSTANTS else "**no**"
+        supported = _supported(kind)
         largest = f"{max(value for _, value in cases):.0e}" if cases else ""
         reasons = "; ".join(dict.fromkeys(case.reason for case, _ in cases if case.reason))
         lines.append(f"| {label} | {supported} | {len(cases) or ''} | {largest}{reasons and f' ({reasons})'} |")
     return "\n".join(lines) + "\n"
+
+
+def _supported(kind: str) -> str:
+    if kind == "ShaderNodeDisplacement":
+        return "yes, but displacement is shown as a bump"
+    if kind not in supported_kinds() and kind not in CONSTANTS:
+        return "**no**"
+    return f"yes, but {APPROXIMATED_NODES[kind]}" if kind in APPROXIMATED_NODES else "yes"
 
 
 def main() -> None:

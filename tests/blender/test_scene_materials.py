@@ -239,6 +239,29 @@ def test_approximations_are_counted_in_one_line(socket, line):
     assert warnings == (f"2 materials ('Linked 0', 'Linked 1'): {line}",)
 
 
+@pytest.mark.parametrize(
+    ("kind", "settings", "line"),
+    [
+        ("ShaderNodeBsdfTranslucent", {}, "translucent light is shown as diffuse"),
+        ("ShaderNodeBsdfAnisotropic", {"distribution": "BECKMANN"}, "highlights have GGX's tails"),
+        ("ShaderNodeBsdfAnisotropic", {"distribution": "GGX"}, None),
+    ],
+)
+def test_shaders_that_are_approximated_say_so(kind, settings, line):
+    made, node = shader_material("Approximated", kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    _, warnings = read(made)
+    assert len(warnings) == (1 if line else 0) and all(line in found for found in warnings)
+
+
+def test_an_output_that_is_approximated_says_so():
+    made, node = shader_material("Worn", "ShaderNodeBsdfDiffuse")
+    geometry = made.node_tree.nodes.new("ShaderNodeNewGeometry")
+    made.node_tree.links.new(geometry.outputs["Pointiness"], node.inputs["Color"])
+    assert read(made)[1] == ("1 material ('Worn'): pointiness is that of a flat place",)
+
+
 def test_alpha_lets_light_pass():
     made = material("Leaf")
     shader = made.node_tree.nodes["Principled BSDF"]

@@ -182,7 +182,13 @@ def number_cases():
         )
 
 
+def turned_normal(node):
+    node.outputs["Normal"].default_value = (0.6, 0.0, 0.8)
+
+
 def vector_cases():
+    for output in ("Normal", "Dot"):
+        yield NodeCase("ShaderNodeNormal", output, {"Normal": "a"}, setup=turned_normal)
     scalar = {"DOT_PRODUCT", "DISTANCE", "LENGTH"}
     there = bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items
     for operation in [name for name in value_code.VECTOR_MATH if name in there]:
