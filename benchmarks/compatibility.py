@@ -62,7 +62,9 @@ def measure(blend: Path, shared: Path, folder: Path, arguments: argparse.Namespa
     passes = read_passes(done.file)
     save_pair(folder / f"{blend.stem}.png", truth, passes)
     found = {name: scores(*(counted(name, p) for p in (truth, passes))) for name in LIMITS}
-    return Outcome(blend.stem, said, (width, height), done.seconds, found, done.details["warnings"])
+    return Outcome(
+        blend.stem, said, (width, height), done.seconds, found, done.details["warnings"], samples=order.samples
+    )
 
 
 def _one(job: Job, folder: Path) -> Done:

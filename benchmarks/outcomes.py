@@ -35,6 +35,7 @@ class Outcome:
     scores: dict[str, dict[str, float]] = field(default_factory=dict)  # pass -> energy, relmse
     warnings: list[str] = field(default_factory=list)
     error: str = ""
+    samples: int = 0
 
     @property
     def passed(self) -> bool:
@@ -62,7 +63,7 @@ def content(outcomes: list[Outcome]) -> str:
     passed = sum(outcome.passed for outcome in outcomes)
     limits = ", ".join(f"{name} {limit}" for name, limit in LIMITS.items())
     head = f"{passed} of {len(outcomes)} files below both limits ({limits}); {_machine()}."
-    header = ["File", "Reference", "Size", "Seconds", "Diffuse Color", "Combined", "Right"]
+    header = ["File", "Reference", "Size", "Samples", "Seconds", "Diffuse Color", "Combined", "Right"]
     text = Table("", header, [_row(outcome) for outcome in outcomes]).markdown()
     said = [_warnings(outcome) for outcome in outcomes if outcome.warnings or outcome.error]
     return "\n\n".join([head, text, "What Rebound says of them:", *said]) + "\n"
@@ -74,11 +75,11 @@ def _machine() -> str:
 
 def _row(outcome: Outcome) -> list[str]:
     if outcome.error:
-        return [outcome.name, *[MISSING] * 5, "**failed**"]
+        return [outcome.name, *[MISSING] * 6, "**failed**"]
     figures = [f"{v['energy']:.3f} / {v['relmse']:.2g}" for v in (outcome.scores[name] for name in LIMITS)]
     size = "{} × {}".format(*outcome.size)
     right = "yes" if outcome.passed else "**no**"
-    return [outcome.name, outcome.reference, size, f"{outcome.seconds:.1f}", *figures, right]
+    return [outcome.name, outcome.reference, size, str(outcome.samples), f"{outcome.seconds:.1f}", *figures, right]
 
 
 def _warnings(outcome: Outcome) -> str:
