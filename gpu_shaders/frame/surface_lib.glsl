@@ -13,8 +13,8 @@ struct Surface {
   float coverage;    /* 0..1: of light that does not pass on */
 };
 
-/* A surface that lets everything pass and yet sends light, as Add Shader makes it, is met in so many samples all the same:
- * what it sends is right on average, and what is behind it loses that part. */
+/* A surface that lets everything pass and yet sends light, as Add Shader makes it, is met all the same, in so many
+ * samples or as many as it reflects: what it sends is right on average, and what is behind it loses that part. */
 const float SURFACE_NO_COVERAGE = 0.01;
 const float SURFACE_ADDED_COVERAGE = 0.125;
 
@@ -41,9 +41,9 @@ Surface surface_toward(Surface surface, float cosine)
   vec3 passing = surface.transparent + surface.transmission * left;
   surface.coverage = 1.0 - clamp((passing.r + passing.g + passing.b) / 3.0, 0.0, 1.0);
   vec3 kept = surface.albedo + surface.specular;
-  bool glows = surface.emission != vec3(0.0);
-  if (surface.coverage < SURFACE_NO_COVERAGE && (glows || max(kept.r, max(kept.g, kept.b)) > SURFACE_NO_COVERAGE)) {
-    surface.coverage = SURFACE_ADDED_COVERAGE;
+  float most = max(kept.r, max(kept.g, kept.b));
+  if (surface.coverage < SURFACE_NO_COVERAGE && (surface.emission != vec3(0.0) || most > SURFACE_NO_COVERAGE)) {
+    surface.coverage = clamp(most, SURFACE_ADDED_COVERAGE, 1.0);
   }
   return surface;
 }
