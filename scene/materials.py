@@ -12,7 +12,7 @@ from .data import Array, Material
 from .images import ImageReader
 from .node_graph import FilledGraph, Input, Link, Node, ReadGraph, Slot
 from .node_look import Look, look_of
-from .node_reader import read_graph
+from .node_reader import MOST, read_graph
 from .nodes import active_output, find_input, node_tree, source
 
 # Fields of a generated shader's point that an Object Info node gives.
@@ -87,7 +87,7 @@ class MaterialTable:
 
 def _fields(look: Look) -> dict:
     """The constants of a Material."""
-    colors = {name: tuple(getattr(look, name).tolist()) for name in ("emission", "specular")}
+    colors = {name: tuple(getattr(look, name).clip(-MOST, MOST).tolist()) for name in ("emission", "specular")}
     base = tuple(look.base.clip(0.0, 1.0).tolist())
     numbers = {name: float(getattr(look, name)) for name in ("metallic", "roughness", "layered", "passing")}
     return {"base_color": base, **colors, **numbers}

@@ -40,8 +40,8 @@ ImageOf = Callable[[Hashable], Image | None]
 
 MAX_DEPTH = 50  # calls within one another: nodes are read inputs first, so only circles of links go deeper than a few
 MAX_IMAGES = 16  # of one material: what is left of a shader's 32 samplers for its other inputs and those of the frame
+MOST = 1e20  # Blender makes 3e38 of an infinite number, of which a product is infinite in single precision
 MAGENTA = (1.0, 0.0, 1.0)  # Blender's colour for a missing image
-BLACK = (0.0, 0.0, 0.0)
 
 TYPES = {"VALUE": FLOAT, "INT": FLOAT, "BOOLEAN": FLOAT, "VECTOR": VECTOR, "ROTATION": VECTOR, "RGBA": COLOR}
 TYPES["SHADER"] = SHADER
@@ -80,7 +80,12 @@ def read_graph(
     link = surface if isinstance(surface, Link) else None
     graph = NodeGraph(tuple(reader.nodes), link)
     filled = FilledGraph(graph, reader.values.array().tobytes(), tuple(reader.images))
-    return ReadGraph(filled, tuple(reader.unsupported))
+    unsupported = list(reader.unsupported)
+    if reader.crowded_out:
+        unsupported.append(
+            f"{reader.crowded_out} of its images are too many ({MAX_IMAGES} fit), magenta is shown instead"
+        )
+    return ReadGraph(filled, tuple(unsupported))
 
 
 class _Reader:
@@ -90,6 +95,7 @@ class _Reader:
         self.images: dict[Hashable, None] = {}
         self.unsupported: dict[str, None] = {}
         self._normal: Link | Place = Place("normal")  # what normals are that nothing is linked to
+        self.crowded_out = 0  # images beyond what one shader can have
         self._read_image = read_image
         self._read_sky = read_sky
         self._image_of = image_of
@@ -262,10 +268,11 @@ class _Reader:
         key = self._read_image(node.image, node.image_user) if node.image is not None else None
         full = key is not None and key not in self.images and len(self.images) >= MAX_IMAGES
         if full:
-            self._name(node, f"is one image too many ({MAX_IMAGES} a material), magenta is shown")
+            self.crowded_out += 1
+        if node.image is None:
+            self._name(node, "has no image, magenta is shown")
         if key is None or full:
-            shown = BLACK if node.image is None else MAGENTA
-            return self._plain(node, shown)
+            return self._plain(node, MAGENTA)
         self.images.setdefault(key)
         extra, options = self._properties(node)
         # As in Cycles: a colour whose alpha goes nowhere is dark where it is transparent.
@@ -369,11 +376,11 @@ def _key(found: Socket) -> tuple[int, ...]:
 
 
 def numbers(value, type: str) -> tuple[float, ...]:
-    """A socket's value as the one or three numbers of its type; what is not finite counts as 0."""
+    """A socket's value as the one or three numbers of its type, within MOST; what is not finite counts as 0."""
     several = [float(v) for v in value] if hasattr(value, "__len__") else [float(value)]
     count = 1 if type == FLOAT else 3
     several = (several * count if len(several) == 1 else several)[:count]
-    return tuple(v if math.isfinite(v) else 0.0 for v in several)
+    return tuple(min(max(v, -MOST), MOST) if math.isfinite(v) else 0.0 for v in several)
 
 
 def _tile_rows(image: Image) -> np.ndarray:

@@ -23,6 +23,9 @@ def read_world(world, images: ImageReader, warn: Callable[[str], None]) -> World
     if tree is None:
         return World(_finite(world.color), **_settings(world))
     output = active_output(tree)
+    volume = find_input(output, "Volume") if output else None
+    if volume is not None and volume.socket.is_linked:
+        warn(f"World '{world.name}': volumes are not supported, its air is clear")
     surface = find_input(output, "Surface") if output else None
     if surface is None or not surface.socket.is_linked:
         return World()

@@ -1,4 +1,5 @@
-/* Shadows of what lets light pass: of each texel's light as much is stopped, all or nothing, as of the whole. */
+/* Shadows of what lets light pass: of each texel's light as much is stopped, all or nothing, as of the whole. The
+ * material is asked from the side of what the shadow falls on, whence Cycles' rays come. */
 #include "frame/material_dither_lib.glsl"
 #include "frame/material_mesh_lib.glsl"
 #include "frame/shadow_slope_lib.glsl"
@@ -6,7 +7,7 @@
 
 void main()
 {
-  vec3 toward = math_toward(v_position, pc_eye);
+  vec3 toward = -math_toward(v_position, pc_eye);
   MaterialPlace place = material_place(toward);
   Surface surface = material_evaluate(place);
   shadow_write();

@@ -157,10 +157,11 @@ def test_file_that_is_no_image_is_magenta_and_named(tmp_path):
     assert material_of(scene).base_color == (1, 0, 1) and "broken.png" in scene.warnings[0]
 
 
-def test_texture_node_without_an_image_is_black():
-    textured(None)
+def test_texture_node_without_an_image_is_magenta_with_one_line():
+    node = textured(None)
     scene = convert()
-    assert material_of(scene).base_color == (0, 0, 0) and scene.warnings == ()
+    assert material_of(scene).base_color == (1, 0, 1)
+    assert len(scene.warnings) == 1 and f"node '{node.name}' has no image" in scene.warnings[0]
 
 
 def test_emission_texture_is_multiplied_by_the_strength():

@@ -1,6 +1,7 @@
 """The common shaders are read exactly; what is not read gives one line and something visible."""
 
 import bpy
+import numpy as np
 import pytest
 
 from rebound.scene.data import Material
@@ -294,6 +295,12 @@ def test_value_that_is_not_finite_is_zero():
     value.outputs[0].default_value = float("nan")
     made.node_tree.links.new(value.outputs[0], shader.inputs["Strength"])
     assert read(made)[0].emission == (0, 0, 0)
+
+
+def test_infinite_emission_is_cut():
+    """Blender stores 3.4e38 for it, of which any product is infinite in single precision."""
+    made, shader = shader_material("Nova", "ShaderNodeEmission", Color=(1, 1, 1, 1), Strength=float("inf"))
+    assert np.isfinite(np.float32(read(made)[0].emission)).all()
 
 
 def test_shared_material_is_read_once():

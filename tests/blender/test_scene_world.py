@@ -38,6 +38,13 @@ def test_a_texture_becomes_a_graph_with_its_image(world):
     assert scene.world.images == tuple(scene.images) and scene.warnings == ()
 
 
+def test_a_volume_is_named(world):
+    volume = world.node_tree.nodes.new("ShaderNodeVolumePrincipled")
+    world.node_tree.links.new(volume.outputs[0], world.node_tree.nodes["World Output"].inputs["Volume"])
+    scene = convert()
+    assert len(scene.warnings) == 1 and "volumes are not supported" in scene.warnings[0]
+
+
 def test_numbers_are_no_part_of_the_graph(world):
     node = feed(world, "ShaderNodeTexGradient")
     before = convert().world
