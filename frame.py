@@ -26,6 +26,7 @@ class Frame:
     gbuffer: GBuffer
     gbuffer_target: Target
     emission_target: Target  # the G-buffer's emission alone
+    tint_target: Target  # all of it that colours what is seen
     background_target: Target  # what of the G-buffer means something where there is no surface
     light: LightTargets
     direct_target: Target  # both direct ones of ``light``
@@ -49,6 +50,7 @@ class Frame:
         targets = (
             self.gbuffer_target,
             self.emission_target,
+            self.tint_target,
             self.background_target,
             *self._lights,
             self.direct_target,
@@ -100,6 +102,7 @@ def new_frame(device: Device, width: int, height: int, passes: Sequence[str]) ->
         gbuffer,
         device.target(gbuffer.colors, gbuffer.depth),
         device.target([gbuffer.emission]),
+        device.target([gbuffer.albedo, gbuffer.emission, gbuffer.specular], gbuffer.depth),
         device.target([gbuffer.albedo, gbuffer.position], gbuffer.depth),
         light,
         device.target(direct),

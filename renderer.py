@@ -23,7 +23,7 @@ from .gpu_shaders.frame.draws import ADD, draw_scene, visible_draws
 from .gpu_shaders.frame.inputs import FrameInputs
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
-from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, accumulate
+from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, TINT, accumulate
 from .gpu_shaders.frame.views import (
     LAMPS,
     MOMENTS,
@@ -111,9 +111,14 @@ class Renderer:
         technique = self._technique(settings)
         shown = shown_view(settings)
         frame.extras.keep(needed(shown, split=bool(settings["split"])))
+        passed = _passed(gpu_scene)
+        if passed and not gpu_scene.environment.has_background:
+            self.device.clear(frame.emission_target, color=(*_background(gpu_scene), 0.0))
         self._draw_gbuffer(frame, inputs)
         if _has_panorama(gpu_scene):
             gpu_scene.environment.draw_background(inputs, frame.emission_target)
+        if passed:
+            self._tint(frame, inputs, passed)
         self.clock.mark("surfaces")
         yield GBUFFER_DONE
         for done in self._draw_direct(frame, inputs, settings):
@@ -248,6 +253,20 @@ class Renderer:
             pc_dither=inputs.noise_seed(4) + inputs.sample,
         )
 
+    def _tint(self, frame: Frame, inputs: FrameInputs, passed: Sequence[Draw]) -> None:
+        """Colour what is seen by what lies in front of it, which all let it through in this sample."""
+        draw_scene(
+            self.device,
+            inputs.gpu_scene,
+            TINT,
+            frame.tint_target,
+            passed,
+            state=DrawState(depth_test="LESS", blend="MULTIPLY"),
+            lets_pass=lambda material: False,  # it decides nothing
+            pc_clip_from_world=inputs.clip_from_world,
+            pc_eye=inputs.eye,
+        )
+
     def _accumulate(self, frame: Frame, inputs: FrameInputs, *, indirect: bool) -> None:
         """Add the sample to all sums."""
         state = ADD if frame.samples else DrawState()
@@ -284,11 +303,11 @@ class Renderer:
         given: dict[str, Any] = {
             f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))
         }
-        color = scene.world.color if scene.world.seen else (0.0, 0.0, 0.0)
+        color = _background(inputs.gpu_scene)
         given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*color, 1.0)
+        panorama = _has_panorama(inputs.gpu_scene) or bool(_passed(inputs.gpu_scene) and not scene.film_transparent)
         given["pc_eye"] = inputs.eye
         for sums, target in targets.items():
-            panorama = _has_panorama(inputs.gpu_scene)
             shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect, panorama=panorama)
             wanted = (*shader.samplers, *shader.constants)
             resources = {name: given[name] for name in wanted}
@@ -310,6 +329,18 @@ class Renderer:
             technique.view(view.key, inputs, values, target, light)
 
         draw_technique_view(self.device, view, frame.extras, scratch, combined, frame.samples, draw)
+
+
+def _passed(gpu_scene: GpuScene) -> list[Draw]:
+    """The draws that a camera may see through."""
+    draws = visible_draws(gpu_scene, Visibility.CAMERA)
+    return [draw for draw in draws if gpu_scene.lets_pass(draw.material) and Visibility.HOLDOUT not in draw.visibility]
+
+
+def _background(gpu_scene: GpuScene) -> tuple[float, float, float]:
+    """Radiance of a background of one colour."""
+    world = gpu_scene.scene.world
+    return world.color if world.seen else (0.0, 0.0, 0.0)
 
 
 def _has_panorama(gpu_scene: GpuScene) -> bool:

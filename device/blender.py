@@ -26,7 +26,7 @@ gpu: Any = _gpu
 _FORMATS = {"DEPTH32F": "DEPTH_COMPONENT32F"}
 _IS_4_5 = bpy.app.version < (5, 0, 0)
 _HAS_SAMPLER_STATE = bpy.app.version >= (5, 2, 0)
-_BLEND = {"NONE": "NONE", "ADDITIVE": "ADDITIVE_PREMULT", "ALPHA_PREMULT": "ALPHA_PREMULT"}
+_BLEND = {name: name for name in ("NONE", "MULTIPLY", "ALPHA_PREMULT")} | {"ADDITIVE": "ADDITIVE_PREMULT"}
 
 # Programs live until the extension is disabled: a shader that is freed while bound makes the next draw on OpenGL use
 # the old program, and engine objects die on threads without a GPU context.

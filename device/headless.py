@@ -18,6 +18,11 @@ from .shader import Shader, ShaderError
 
 _DTYPES = {"RGBA16F": "f2", "RG16F": "f2", "R16F": "f2", "R32UI": "u4", "R32I": "i4"}
 _GL_SRGB8_ALPHA8 = 0x8C43
+_BLEND_FUNCTIONS = {
+    "ADDITIVE": (moderngl.ONE, moderngl.ONE),
+    "MULTIPLY": (moderngl.DST_COLOR, moderngl.ZERO),
+    "ALPHA_PREMULT": (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA),
+}
 _DEPTH_FUNCTIONS = {
     "LESS": "<", "LESS_EQUAL": "<=", "EQUAL": "==", "GREATER": ">", "GREATER_EQUAL": ">=", "ALWAYS": "1",
 }  # fmt: skip
@@ -159,8 +164,7 @@ class HeadlessDevice(Device):
             ctx.depth_func = _DEPTH_FUNCTIONS[state.depth_test]
         if state.blend != "NONE":
             flags |= moderngl.BLEND
-            additive = state.blend == "ADDITIVE"
-            ctx.blend_func = moderngl.ONE, moderngl.ONE if additive else moderngl.ONE_MINUS_SRC_ALPHA
+            ctx.blend_func = _BLEND_FUNCTIONS[state.blend]
         if state.cull != "NONE":
             flags |= moderngl.CULL_FACE
             ctx.cull_face = state.cull.lower()

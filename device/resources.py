@@ -81,7 +81,7 @@ class Vertices:
 class DrawState:
     """Fixed-function state of a draw. ``depth_write`` needs a depth test; use "ALWAYS" to write without testing.
 
-    blend: "ADDITIVE" is dst + src in all four channels, "ALPHA_PREMULT" is src + dst * (1 - src.a).
+    blend: "ADDITIVE" is dst + src in all four channels, "MULTIPLY" dst * src, "ALPHA_PREMULT" src + dst * (1 - src.a).
     cull: the faces left out; counter-clockwise is the front.
     """
 
@@ -97,7 +97,7 @@ class DrawState:
                 self.depth_test,
                 ("NONE", "LESS", "LESS_EQUAL", "EQUAL", "GREATER", "GREATER_EQUAL", "ALWAYS"),
             ),
-            ("blend", self.blend, ("NONE", "ADDITIVE", "ALPHA_PREMULT")),
+            ("blend", self.blend, ("NONE", "ADDITIVE", "MULTIPLY", "ALPHA_PREMULT")),
             ("cull", self.cull, ("NONE", "BACK", "FRONT")),
         ):
             if value not in allowed:

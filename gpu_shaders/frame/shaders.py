@@ -50,6 +50,25 @@ GBUFFER = Shader(
     defines=(("MATERIAL_CAMERA_RAY", "1"),),
 )
 
+# The colour of what was passed on the way to the surface that is seen.
+TINT = Shader(
+    name="frame_tint",
+    vertex="frame/frame_draw_vert.glsl",
+    fragment="frame/frame_tint_frag.glsl",
+    inputs=MESH_INPUTS,
+    varyings=MESH_VARYINGS,
+    outputs={"out_albedo": "VEC4", "out_emission": "VEC4", "out_specular": "VEC4"},
+    samplers=MESH_SAMPLERS,
+    structs=(INSTANCE, MATERIAL),
+    constants={
+        "pc_clip_from_world": "MAT4",
+        "pc_eye": "VEC4",
+        "pc_first_instance": "INT",
+        "pc_material": "INT",
+    },
+    defines=(("MATERIAL_CAMERA_RAY", "1"),),
+)
+
 _SHADOW_CONSTANTS = {
     "pc_clip_from_world": "MAT4",
     "pc_first_instance": "INT",
@@ -193,4 +212,4 @@ _ACCUMULATE = tuple(
     for lit, panorama in ((False, False), (True, False), (True, True))
 )
 
-SHADERS = (GBUFFER, SHADOW, SHADOW_PASSING, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)
+SHADERS = (GBUFFER, TINT, SHADOW, SHADOW_PASSING, *DIRECT.values(), *_ACCUMULATE, GEOMETRY, RESOLVE, DISPLAY, SPLIT)

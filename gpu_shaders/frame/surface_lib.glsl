@@ -11,6 +11,7 @@ struct Surface {
   vec3 transparent;  /* what passes straight on */
   vec3 transmission; /* what passes on of what the lobe leaves */
   float coverage;    /* 0..1: of light that does not pass on */
+  vec3 passing;      /* what passes on, in all */
 };
 
 /* A surface that lets everything pass and yet sends light, as Add Shader makes it, is met all the same, in so many
@@ -38,8 +39,8 @@ Surface surface_toward(Surface surface, float cosine)
   }
   float left = 1.0 - max(taken.r, max(taken.g, taken.b));
   surface.albedo = surface.diffuse * left;
-  vec3 passing = surface.transparent + surface.transmission * left;
-  surface.coverage = 1.0 - clamp((passing.r + passing.g + passing.b) / 3.0, 0.0, 1.0);
+  surface.passing = surface.transparent + surface.transmission * left;
+  surface.coverage = 1.0 - clamp((surface.passing.r + surface.passing.g + surface.passing.b) / 3.0, 0.0, 1.0);
   vec3 kept = surface.albedo + surface.specular;
   float most = max(kept.r, max(kept.g, kept.b));
   if (surface.coverage < SURFACE_NO_COVERAGE && (surface.emission != vec3(0.0) || most > SURFACE_NO_COVERAGE)) {

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rebound.scene.data import Image, Instance, Material, Mesh
+from rebound.scene.data import Image, Instance, Material, Mesh, World
 from rebound.settings import Settings
-from rebound.tests.support.graphs import image_material
+from rebound.tests.support.graphs import image_material, pane
 from rebound.tests.support.render_scenes import (
     EVERYTHING,
     QUICK,
@@ -103,6 +103,20 @@ def test_texture_lies_where_its_uv_map_says(studio):
     shown, pixels = textured(closest=False, repeat=True, uv_map="second")
     found = studio.render(shown, view, 1, ["diffuse_color"])
     np.testing.assert_allclose(found["diffuse_color"], pixels.transpose(1, 0, 2), atol=1e-3)
+
+
+@pytest.mark.parametrize("behind", ["world", "surface"])
+def test_panes_colour_what_is_seen_through_them(studio, behind):
+    """Two of them, one before the other: each lets its colour of the light pass, on average over samples."""
+    panes = [quad(f"pane {k}", (0, 0, 1.0 + k)) for k in range(2)]
+    lamp = Material("Lamp", (0, 0, 0), emission=(1.0, 2.0, 4.0))
+    meshes, worn = [*panes], [pane("Red", (0.9, 0.5, 0.1)), pane("Blue", (0.2, 0.4, 0.9))]
+    if behind == "surface":
+        meshes, worn = [*meshes, quad("lamp", u=(2, 0, 0), v=(0, 2, 0))], [*worn, lamp]
+    shown = scene(meshes, [], materials=worn, world=World((1.0, 2.0, 4.0)), filter_width=1e-3)
+    found = studio.render(shown, ortho(16, 16, 0.5), 64, ["combined"])["combined"][..., :3]
+    expected = np.array([0.9, 0.5, 0.1]) * [0.2, 0.4, 0.9] * [1.0, 2.0, 4.0]
+    np.testing.assert_allclose(found.mean((0, 1)), expected, rtol=0.05)  # noise: 1.5 %
 
 
 def test_material_is_shown_by_its_constants_until_it_is_compiled(studio):

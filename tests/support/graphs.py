@@ -76,3 +76,11 @@ def image_material(
     )
     filled = FilledGraph(NodeGraph(nodes, Link(4, "Shader")), values.array().tobytes(), (image.key,))
     return graph_material(name, filled, {str(image.key): image})
+
+
+def pane(name: str, rgb) -> Material:
+    """What lets light pass, coloured."""
+    values = Values()
+    color = Input("Color", COLOR, values.add(COLOR, rgb))
+    nodes = (Node("ShaderNodeBsdfTransparent", (color,), (("BSDF", SHADER),)),)
+    return graph_material(name, FilledGraph(NodeGraph(nodes, Link(0, "BSDF")), values.array().tobytes()))
