@@ -162,6 +162,14 @@ def test_additive_blend_adds_all_four_channels(device, format):
     np.testing.assert_array_equal(device.read(target.colors[0])[1, 1], colors.sum(0))
 
 
+@pytest.mark.parametrize("format", ["RGBA32F", "RGBA16F"])
+def test_multiplied_blend_multiplies_all_four_channels(device, format):
+    target = canvas(device, formats=(format,))
+    device.clear(target, (1, 2, 3, 0.5))
+    device.fullscreen(FILL, target, state=DrawState(blend="MULTIPLY"), pc_color=(0.5, 3, 0, 0.5))
+    np.testing.assert_array_equal(device.read(target.colors[0])[1, 1], [0.5, 6, 0, 0.25])
+
+
 def test_premultiplied_alpha_blends_over(device):
     target = canvas(device)
     device.clear(target, (1, 2, 3, 1))
