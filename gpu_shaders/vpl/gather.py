@@ -188,6 +188,8 @@ class Gathering:
                 targets=targets,
             )
             inputs.mark("reflect")
+        else:
+            self._reflections.free()  # what they remember would be of an older picture than the one before
         self._before, self._drawn = now if reuses else None, now
         self._whole = True
 

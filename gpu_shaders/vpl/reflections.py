@@ -38,7 +38,8 @@ class Reflections:
         """Add what this sample finds. ``old_view``: OLD_VIEW of the picture before; ``mean``: whether that counts, for
         at most ``most_history`` samples; ``denoise``: whether the filter runs over it.
         """
-        self._fit(size)
+        if self._fit(size):
+            most_history = 0.0  # the picture before showed nothing glossy
         self._turn()
         surface, old_surface = self._surfaces
         self.device.fullscreen(
@@ -79,9 +80,10 @@ class Reflections:
             self.device.free(resource)
         self._size, self._resources = (0, 0), ()
 
-    def _fit(self, size: tuple[int, int]) -> None:
+    def _fit(self, size: tuple[int, int]) -> bool:
+        """Have textures of this size; whether they are new, and hold nothing yet."""
         if size == self._size:
-            return
+            return False
         self.free()
 
         def pair() -> list[Texture]:
@@ -96,6 +98,7 @@ class Reflections:
         textures = (*self._surfaces, *self._rays, *self._histories, *self._direct_histories)
         self._resources = (*self._ray_targets, *self._mean_targets, *self._filter.resources, *textures)
         self._size = size
+        return True
 
     def _turn(self) -> None:
         """Make what is newest the picture before."""

@@ -135,6 +135,25 @@ def test_still_viewport_keeps_nothing_of_a_far_brighter_light(studio):
     assert dim * 300 == pytest.approx(bright, rel=0.1)
 
 
+def test_floor_that_is_glossy_again_knows_nothing_of_what_it_reflected_before(studio):
+    settings = Settings.defaults(**{**QUICK, **VPL, "vpl_reuse": True})
+    frame = studio.renderer.begin(VIEW, ("glossy_direct",))
+
+    def reflected(metallic, sky):
+        shown = picture([], sky=sky)
+        floor = Material("floor", metallic=metallic, roughness=0.5)
+        studio.show(replace(shown, materials=(floor, *shown.materials[1:])))
+        studio.renderer.restart(frame)
+        for _ in studio.renderer.sample(frame, studio.gpu_scene, VIEW, settings):
+            pass
+        return studio.renderer.read(frame, "glossy_direct").mean()
+
+    bright, dull, dim = reflected(1.0, 100.0), reflected(0.0, 1.0), reflected(1.0, 1.0)
+    studio.renderer.free_frame(frame)
+    assert dull == 0.0
+    assert 100.0 * dim == pytest.approx(bright, rel=0.1)
+
+
 def test_picture_without_lights_is_waited_for_once(studio):
     """The only lamp moves and is deleted while the picture still settles."""
     settings = Settings.defaults(**{**QUICK, **VPL, "vpl_reuse": True})
