@@ -225,6 +225,8 @@ class _Reader:
             return None
         if node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"}:
             return self._image(found)
+        if node.bl_idname == "ShaderNodeTexCoord" and node.object is not None and node.outputs["Object"].is_linked:
+            self._name(node, f"takes coordinates of the object itself, not of '{node.object.name}'")
         table = curve_rows(node)
         extra, options = self._properties(node)
         if node.bl_idname == "ShaderNodeTexVoronoi" and bpy.app.version < (5, 0, 0):

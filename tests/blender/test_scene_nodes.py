@@ -164,6 +164,16 @@ def test_an_output_that_is_not_supported_is_named(tree, monkeypatch):
     assert "point.uv" in generate(found.filled.graph).text
 
 
+def test_coordinates_of_another_object_are_named(tree):
+    place, mix = tree.nodes.new("ShaderNodeTexCoord"), add(tree, "ShaderNodeMixRGB", Fac=0.3)
+    place.name, place.object = "Place", bpy.data.objects.new("Target", None)
+    tree.links.new(place.outputs["Generated"], by_identifier(mix.inputs, "Color2"))
+    emit(tree, mix.outputs[0])
+    assert read().unsupported == ()
+    tree.links.new(place.outputs["Object"], by_identifier(mix.inputs, "Color1"))
+    assert read().unsupported == ("node 'Place' takes coordinates of the object itself, not of 'Target'",)
+
+
 def test_an_unsupported_shader_is_diffuse_of_its_colour(tree):
     hair, output = add(tree, "ShaderNodeBsdfHair", Color=COLOR), tree.nodes.new("ShaderNodeOutputMaterial")
     hair.name = "Hair"
