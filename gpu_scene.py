@@ -61,7 +61,7 @@ class GpuScene:
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._placed: list[Instance] = []  # those of every row
         self._told = np.zeros((0, 12))  # what materials can ask of them beside their place: _instance_row()
-        self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of the draws that let lamps' light pass
+        self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of what blocks a part of lamps' light
         self._meshes: dict[tuple[Hashable, Layout], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
         self.environment = Environment(device)
@@ -178,7 +178,11 @@ class GpuScene:
         del self._moved[:-REMEMBERED_MOVES]
 
     def _find_passing(self) -> None:
-        passing = [draw.bounds for draw in self.draws if self.lets_lamps_pass(draw.material)]
+        passing = [
+            draw.bounds
+            for draw in self.draws
+            if self.lets_lamps_pass(draw.material) and Visibility.SHADOW in draw.visibility
+        ]
         self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
 
     def lets_lamps_pass(self, material: int) -> bool:

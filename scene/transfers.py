@@ -78,7 +78,7 @@ class TransferReader:
         if before is not None:
             return before
         with tempfile.TemporaryDirectory(prefix="rebound-bake-") as folder:
-            path = Path(folder) / image.name
+            path = Path(folder) / "packed.exr"  # the image may be called what no file can be
             path.write_bytes(packed.data)
             return _transfer(key, read_bake(path))
 
