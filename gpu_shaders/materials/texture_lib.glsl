@@ -1,7 +1,7 @@
 /* Image and Environment Texture: projections, filters and what lies beyond the image's edges. `filtering`: linear (0),
- * closest (1), cubic (2); `extension`: repeat (0), extend (1), clip (2), mirror (3); `alpha`: data (0), whose colour is not alpha's; colours that
- * come out times alpha (1) or without it (2), filtered times alpha both, so that what is transparent has no say. `place` is where in its texture an
- * image lies: lower left texel and size. */
+ * closest (1), cubic (2); `extension`: repeat (0), extend (1), clip (2), mirror (3); `alpha`: data (0), whose colour is
+ * not alpha's; colours that come out times alpha (1) or without it (2), filtered times alpha both, so that what is
+ * transparent has no say. `place` is where in its texture an image lies: lower left texel and size. */
 
 const float TEXTURE_PI = 3.14159265358979;
 

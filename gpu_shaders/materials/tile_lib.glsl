@@ -1,5 +1,5 @@
-/* UDIM tiles of an image, that lie in one texture: their places are texels of the materials' values, four numbers each, tile 1001 first. `value_fetch`
- * is the generated shader's. */
+/* UDIM tiles of an image, that lie in one texture: their places are texels of the materials' values, four numbers each,
+ * tile 1001 first. `value_fetch` is the generated shader's. */
 
 #include "materials/texture_lib.glsl"
 

@@ -2,7 +2,8 @@
  * with the receiver's cosine found, chosen for its nearness alone. Each is weighted by the balance heuristic (Veach &
  * Guibas 1995) of both, so that neither touching surfaces nor small bright patches make noise, and no clamp is needed.
  *
- * Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of vpl/structs.py. */
+ * Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of
+ * vpl/structs.py. */
 #include "frame/light_map_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
@@ -104,10 +105,10 @@ vec4 candidates_cube(vec3 P, out int level)
   return candidates_cube_of(level);
 }
 
-/* Radiance that the cache holds for what a ray hit after `far`, and the part of it that came from the sky: that of the point whose plane the hit lies on best, out of
- * one for each way that the surface may face, if nothing is between it and the hit. The cell is jittered, so that over
- * many rays the cells' values blend; cells that know nothing of the hit are passed over. Where all do, it is not `known`:
- * what is hidden is never believed, or light would pass walls. */
+/* Radiance that the cache holds for what a ray hit after `far`, and the part of it that came from the sky: that of the
+ * point whose plane the hit lies on best, out of one for each way that the surface may face, if nothing is between it and
+ * the hit. The cell is jittered, so that over many rays the cells' values blend; cells that know nothing of the hit are
+ * passed over. Where all do, it is not `known`: what is hidden is never believed, or light would pass walls. */
 vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out bool known, out vec3 from_sky)
 {
   known = true;
