@@ -31,7 +31,10 @@ void main()
   vec2 pixel = (0.5 + 0.5 * clip.xy / clip.w) * old_view.size - 0.5;
   vec4 history = vec4(0.0), direct_history = vec4(0.0);
   if (clip.w > 0.0 && pc_most_history > 0.0) {
-    HistoryTaps taps = history_taps(old_surface_tx, (pixel - old_view.offset) / old_view.stride, at);
+    vec2 place = (pixel - old_view.offset) / old_view.stride;
+    /* Between texels it would be blurred once more in every sample of a still view, without end. */
+    place = pc_still != 0 ? floor(place + 0.5) : place;
+    HistoryTaps taps = history_taps(old_surface_tx, place, at);
     history = history_mean(taps, history_tx);
     direct_history = history_mean(taps, direct_history_tx);
   }
