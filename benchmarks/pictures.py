@@ -16,7 +16,7 @@ LONG_NAMES = {
     old + short: f"{new} {long}"
     for old, new in (("Diff", "Diffuse"), ("Gloss", "Glossy"))
     for short, long in (("Dir", "Direct"), ("Ind", "Indirect"), ("Col", "Color"))
-}
+} | {"Env": "Environment", "Emit": "Emission"}
 
 COMBINED = "Combined"
 INDIRECT = "DiffInd*"  # radiance of indirect diffuse light: the pass times the colour

@@ -7,7 +7,8 @@ WORD = 0xFFFFFFFF
 
 def object_random(instance) -> float:
     """The number of a depsgraph's instance, 0..1. Blender gives one to instances only; an object's is its name's."""
-    number = instance.random_id if instance.is_instance else _hashed(_of_text(instance.object.name), 0)
+    # Signed in Blender 4.5.
+    number = instance.random_id & WORD if instance.is_instance else _hashed(_of_text(instance.object.name), 0)
     return number / WORD
 
 
