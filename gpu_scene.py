@@ -19,8 +19,8 @@ from .gpu_shaders.frame.reflective_shaders import REFLECT
 from .gpu_shaders.frame.shaders import GBUFFER, SHADOW_PASSING
 from .gpu_shaders.frame.structs import INSTANCE, MATERIAL, MATERIAL_VIEW
 from .gpu_shaders.frame.surface_points import SURFACE_POINT_DRAW
-from .gpu_shaders.frame.tables import replace_table
-from .gpu_shaders.materials import VALUE_WIDTH, Attribute, MaterialShader, generate
+from .gpu_shaders.frame.tables import replace_table, replace_texels
+from .gpu_shaders.materials import Attribute, MaterialShader, generate
 from .scene.changes import Changes, told, world_boxes
 from .scene.data import Image, Instance, Material, Mesh, Scene, View, Visibility
 
@@ -61,6 +61,7 @@ class GpuScene:
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._placed: list[Instance] = []  # those of every row
         self._told = np.zeros((0, 12))  # what materials can ask of them beside their place: _instance_row()
+        self.seen_through: tuple[Draw, ...] = ()  # what a camera may look through
         self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of what blocks a part of lamps' light
         self._meshes: dict[tuple[Hashable, Layout], Vertices] = {}
         self._images: dict[Hashable, Texture] = {}
@@ -90,9 +91,7 @@ class GpuScene:
             self.scene = replace(scene, lights=(*scene.lights, *self.environment.suns))
         if changes.materials or self.material_table is None:
             self._upload_materials(scene.materials)
-        same_draws = self.instance_table is not None and fields_before == [
-            code and code.mesh_fields for code in self._codes
-        ]
+        same_draws = self.instance_table is not None and fields_before == self._mesh_fields
         only_instances = same_draws and not (changes.materials or changes.meshes_added or changes.meshes_removed)
         if (changes.geometry or not same_draws) and not (only_instances and self._move(scene)):
             self._place(scene)
@@ -178,10 +177,11 @@ class GpuScene:
         del self._moved[:-REMEMBERED_MOVES]
 
     def _find_passing(self) -> None:
+        thin = [draw for draw in self.draws if self.lets_pass(draw.material)]
+        camera = Visibility.CAMERA | Visibility.HOLDOUT
+        self.seen_through = tuple(draw for draw in thin if draw.visibility & camera == Visibility.CAMERA)
         passing = [
-            draw.bounds
-            for draw in self.draws
-            if self.lets_lamps_pass(draw.material) and Visibility.SHADOW in draw.visibility
+            draw.bounds for draw in thin if self.lets_lamps_pass(draw.material) and Visibility.SHADOW in draw.visibility
         ]
         self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
 
@@ -237,8 +237,8 @@ class GpuScene:
         self._codes = tuple(None if m.graph is None else generate(m.graph.graph) for m in materials)
         tables = [np.zeros((1, 4), np.float32) if m.graph is None else m.graph.table for m in materials]
         self._first_values = tuple(np.cumsum([0, *map(len, tables)])[:-1].tolist())
-        self.device.free(self.value_table)
-        self.value_table = self.device.texture(*_value_rows(tables))
+        texels = np.concatenate([*tables, np.zeros((1, 4), np.float32)])
+        self.value_table = replace_texels(self.device, texels, self.value_table)
 
     def _place(self, scene: Scene) -> None:
         """Upload new meshes and the table of instances, and list the draws."""
@@ -352,12 +352,3 @@ def _instance_row(instance: Instance, mesh: Mesh) -> tuple[float, ...]:
     lower, upper = mesh.bounds if mesh.texture_space is None else mesh.texture_space
     scale = 1.0 / np.maximum(upper - lower, 1e-20)
     return (*instance.color, *lower.tolist(), *scale.tolist(), instance.random, float(instance.index))
-
-
-def _value_rows(tables: list[np.ndarray]) -> tuple[tuple[int, int], str, np.ndarray]:
-    """All values as the arguments of Device.texture."""
-    values = np.concatenate([*tables, np.zeros((1, 4), np.float32)])
-    height = -(-len(values) // VALUE_WIDTH)
-    rows = np.zeros((height * VALUE_WIDTH, 4), np.float32)
-    rows[: len(values)] = values
-    return (VALUE_WIDTH, height), "RGBA32F", rows.reshape(height, VALUE_WIDTH, 4)

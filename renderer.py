@@ -111,7 +111,7 @@ class Renderer:
         technique = self._technique(settings)
         shown = shown_view(settings)
         frame.extras.keep(needed(shown, split=bool(settings["split"])))
-        passed = _passed(gpu_scene)
+        passed = gpu_scene.seen_through
         if passed and not gpu_scene.environment.has_background:
             self.device.clear(frame.emission_target, color=(*_background(gpu_scene), 0.0))
         self._draw_gbuffer(frame, inputs)
@@ -305,7 +305,7 @@ class Renderer:
         }
         color = _background(inputs.gpu_scene)
         given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*color, 1.0)
-        panorama = _has_panorama(inputs.gpu_scene) or bool(_passed(inputs.gpu_scene) and not scene.film_transparent)
+        panorama = _has_panorama(inputs.gpu_scene) or bool(inputs.gpu_scene.seen_through and not scene.film_transparent)
         given["pc_eye"] = inputs.eye
         for sums, target in targets.items():
             shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect, panorama=panorama)
@@ -329,12 +329,6 @@ class Renderer:
             technique.view(view.key, inputs, values, target, light)
 
         draw_technique_view(self.device, view, frame.extras, scratch, combined, frame.samples, draw)
-
-
-def _passed(gpu_scene: GpuScene) -> list[Draw]:
-    """The draws that a camera may see through."""
-    draws = visible_draws(gpu_scene, Visibility.CAMERA)
-    return [draw for draw in draws if gpu_scene.lets_pass(draw.material) and Visibility.HOLDOUT not in draw.visibility]
 
 
 def _background(gpu_scene: GpuScene) -> tuple[float, float, float]:

@@ -14,9 +14,9 @@ import numpy as np
 from ...device.interface import Device, Target, Texture
 from ...device.structs import Struct
 from ...scene.data import Light, LightKind, World
-from ..materials.generator import VALUE_WIDTH
 from .environment_map import Sun, harmonics, pyramid, without_suns
 from .environment_shaders import WORLD_VIEW, background_shader, map_shader
+from .tables import replace_texels
 
 if TYPE_CHECKING:
     from .inputs import FrameInputs
@@ -126,11 +126,7 @@ class Environment:
 
     def _upload_values(self) -> None:
         texels = np.asarray(self.world.values, np.float32).reshape(-1, 4)
-        rows = np.zeros((max(-(-len(texels) // VALUE_WIDTH), 1), VALUE_WIDTH, 4), np.float32)
-        rows.reshape(-1, 4)[: len(texels)] = texels
-        if self._values is not None:
-            self.device.free(self._values)
-        self._values = self.device.texture((VALUE_WIDTH, len(rows)), "RGBA32F", rows)
+        self._values = replace_texels(self.device, texels, self._values)
 
     def _graph_inputs(self) -> dict[str, Any]:
         images = {f"image_{number}_tx": texture for number, texture in enumerate(self._images)}

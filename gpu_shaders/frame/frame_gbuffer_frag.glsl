@@ -1,22 +1,12 @@
 #include "frame/material_mesh_lib.glsl"
 #include "lib/math_lib.glsl"
 #include "lib/octahedron_lib.glsl"
-#ifdef MATERIAL_PASSES
-#include "frame/material_dither_lib.glsl"
-#endif
 
 void main()
 {
   vec3 V = math_toward(v_position, pc_eye);
   MaterialPlace place = material_place(V);
-  Surface surface = material_evaluate(place);
-  surface = surface_toward(surface, dot(place.normal, V));
-#ifdef MATERIAL_PASSES
-  if (material_is_passed(surface.coverage)) {
-    discard;
-  }
-  surface = surface_drawn(surface);
-#endif
+  Surface surface = material_drawn(place);
   out_position = vec4(v_position, pc_no_indirect != 0 ? -1.0 : 1.0);
   out_normal = vec4(octahedron_encode(place.normal), octahedron_encode(place.geometric));
   if (pc_holdout != 0) {

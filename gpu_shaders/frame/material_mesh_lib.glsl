@@ -1,5 +1,8 @@
-/* The place on a mesh that a fragment shows. */
+/* The place on a mesh that a fragment shows, and its surface. */
 #include "frame/material_lib.glsl"
+#ifdef MATERIAL_PASSES
+#include "frame/material_dither_lib.glsl"
+#endif
 
 MaterialPlace material_place(vec3 toward)
 {
@@ -17,4 +20,24 @@ MaterialPlace material_place(vec3 toward)
   place.instance = 0;
 #endif
   return place;
+}
+
+/* As it looks from the viewer's side. */
+Surface material_seen(inout MaterialPlace place)
+{
+  Surface surface = material_evaluate(place);
+  return surface_toward(surface, dot(place.normal, place.toward));
+}
+
+/* The same as it is drawn: no fragment where it lets this sample pass. */
+Surface material_drawn(inout MaterialPlace place)
+{
+  Surface surface = material_seen(place);
+#ifdef MATERIAL_PASSES
+  if (material_is_passed(surface.coverage)) {
+    discard;
+  }
+  surface = surface_drawn(surface);
+#endif
+  return surface;
 }

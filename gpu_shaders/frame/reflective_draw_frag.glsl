@@ -5,9 +5,6 @@
 #include "frame/map_lib.glsl"
 #include "frame/material_mesh_lib.glsl"
 #include "lib/lobe_lib.glsl"
-#ifdef MATERIAL_PASSES
-#include "frame/material_dither_lib.glsl"
-#endif
 
 /* A texel's footprint grows as 1 / cosine on a surface that the light only grazes; no flux of note comes from beyond
  * this cosine. */
@@ -29,14 +26,7 @@ void main()
     float cosine = 1.0 / (gl_FragCoord.w * sqrt(distance_squared));
     measure *= cosine * cosine * cosine;
   }
-  Surface surface = material_evaluate(place);
-  surface = surface_toward(surface, dot(place.normal, d));
-#ifdef MATERIAL_PASSES
-  if (material_is_passed(surface.coverage)) {
-    discard;
-  }
-  surface = surface_drawn(surface);
-#endif
+  Surface surface = material_drawn(place);
   float reflects = float(pc_reflects);
   /* A sun's wide map sends no light from where the one inside it does. */
   if (pc_served >= 0) {

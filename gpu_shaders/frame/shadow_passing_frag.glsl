@@ -9,9 +9,9 @@ void main()
 {
   vec3 toward = -math_toward(v_position, pc_eye);
   MaterialPlace place = material_place(toward);
-  Surface surface = material_evaluate(place);
+  Surface surface = material_seen(place);
   shadow_write();
-  if (material_is_passed(surface_toward(surface, dot(place.normal, toward)).coverage)) {
+  if (material_is_passed(surface.coverage)) {
     discard;
   }
 }

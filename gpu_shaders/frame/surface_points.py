@@ -11,12 +11,13 @@ from ...device.shader import Shader
 from ...device.structs import Struct
 from ...scene.data import Material, Visibility
 from ...scene.surface_points import Part, Points, SurfaceSampler, emission_density, gram_matrices
+from ..materials import VALUE_WIDTH
 from .draws import visible_draws
 from .material_pass import material_program
 from .reflective_shaders import SOURCE_DEFINES
 from .shaders import MESH_SAMPLERS
 from .structs import INSTANCE, MATERIAL
-from .tables import replace_table
+from .tables import replace_table, replace_texels
 from .voxel_grids import grid_bounds
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ SURFACE_POINT = Struct(
     texel="int",
     backfacing="float",
 )
-ATTRIBUTE_WIDTH = 1024  # texels a row of attribute_tx
 
 SURFACE_POINT_DRAW = Shader(
     name="surface_point_draw",
@@ -59,7 +59,7 @@ SURFACE_POINT_DRAW = Shader(
         *SOURCE_DEFINES,
         ("MATERIAL_CAMERA_RAY", "0"),
         ("MATERIAL_SCATTERED", "1"),
-        ("ATTRIBUTE_WIDTH", str(ATTRIBUTE_WIDTH)),
+        ("ATTRIBUTE_WIDTH", str(VALUE_WIDTH)),
     ),
 )
 
@@ -167,8 +167,8 @@ class SurfacePoints:
         self._runs = tuple(zip(used.tolist(), first.tolist(), counts.tolist(), strict=True))
         self._table = replace_table(self.device, _packed(points, order), self._table)
         self._attribute_count = points.attributes.shape[1]
-        self.device.free(self._attributes)
-        self._attributes = self.device.texture(*_attribute_rows(points, order))
+        texels = points.attributes[order].reshape(-1, 4)
+        self._attributes = replace_texels(self.device, texels, self._attributes)
 
 
 def _part(draw: Draw, gpu_scene: GpuScene, density: float) -> Part:
@@ -177,15 +177,6 @@ def _part(draw: Draw, gpu_scene: GpuScene, density: float) -> Part:
     code = gpu_scene.code_of(draw.material)
     asked = () if code is None else tuple((a.field, a.name) for a in code.mesh_fields.values())
     return Part(draw.mesh, *triangles, *instances, draw.material, asked, density)
-
-
-def _attribute_rows(points: Points, order: np.ndarray) -> tuple[tuple[int, int], str, np.ndarray]:
-    """What the materials ask of meshes at each point as the arguments of Device.texture, in the order of the table."""
-    texels = points.attributes[order].reshape(-1, 4)
-    height = max(-(-len(texels) // ATTRIBUTE_WIDTH), 1)
-    rows = np.zeros((height * ATTRIBUTE_WIDTH, 4), np.float32)
-    rows[: len(texels)] = texels
-    return (ATTRIBUTE_WIDTH, height), "RGBA32F", rows.reshape(height, ATTRIBUTE_WIDTH, 4)
 
 
 def _packed(points: Points, order: np.ndarray) -> np.ndarray:

@@ -6,6 +6,16 @@ import numpy as np
 
 from ...device.interface import Device, Texture
 from ...device.structs import table_texels
+from ..materials import VALUE_WIDTH
+
+
+def replace_texels(device: Device, texels: np.ndarray, old: Texture | None) -> Texture:
+    """Upload (n, 4) numbers, VALUE_WIDTH of them a row, in place of ``old``, which is freed."""
+    device.free(old)
+    height = max(-(-len(texels) // VALUE_WIDTH), 1)
+    rows = np.zeros((height, VALUE_WIDTH, 4), np.float32)
+    rows.reshape(-1, 4)[: len(texels)] = texels
+    return device.texture((VALUE_WIDTH, height), "RGBA32F", rows)
 
 
 def replace_table(device: Device, packed: np.ndarray, old: Texture | None) -> Texture:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...device.interface import Device, Target, Texture
@@ -33,13 +35,14 @@ class AtrousFilter:
         """Filter ``light[0]`` and its ``direct`` part, one texture if that is kept apart; both filtered."""
         newest = 0
         for step in FILTER_STEPS:
+            apart: dict[str, Any] = {"direct_tx": direct[0]} if direct else {}
             self.device.fullscreen(
                 ATROUS[bool(direct)],
                 self._targets[1 - newest],
                 surface_tx=surface,
                 light_tx=self.light[newest],
                 pc_step=step,
-                **dict(zip(("direct_tx",), direct, strict=False)),  # pyright: ignore[reportArgumentType]
+                **apart,
             )
             newest = 1 - newest
             direct = self.direct[newest : newest + 1]

@@ -1,8 +1,11 @@
 /* What a surface had in the picture before: means over the texels around its place there that show the same surface. */
+#include "vpl/vpl_strength_lib.glsl"
 #include "vpl/vpl_surface_lib.glsl"
 
 /* Of the four texels around a place, those that agree less than this in all know nothing of it. */
 const float HISTORY_LEAST = 0.02;
+/* Means of fewer samples than this do not know their variance. */
+const float HISTORY_FEW = 4.0;
 
 struct HistoryTaps {
   ivec2 lower;
@@ -39,4 +42,25 @@ vec4 history_mean(HistoryTaps taps, sampler2D history_tx)
     }
   }
   return sum;
+}
+
+/* A mean with its newest sample in it. */
+struct HistoryJoined {
+  vec3 mean;
+  float samples;  /* that it stands for */
+  float moment;   /* mean of the squared strength */
+  float variance; /* of the mean's strength; means nothing where `samples` are below HISTORY_FEW */
+};
+
+/* `history`: the mean before and how many samples it stands for, of which at most `most` count. */
+HistoryJoined history_joined(vec4 history, float moment, vec3 light, float most)
+{
+  HistoryJoined joined;
+  joined.samples = min(history.w, most) + 1.0;
+  joined.mean = mix(history.rgb, light, 1.0 / joined.samples);
+  float strength = vpl_strength(light);
+  joined.moment = mix(moment, strength * strength, 1.0 / joined.samples);
+  float level = vpl_strength(joined.mean);
+  joined.variance = max(joined.moment - level * level, 0.0) / max(joined.samples - 1.0, 1.0);
+  return joined;
 }

@@ -1,11 +1,8 @@
 /* A sample of what glossy surfaces reflect joins the mean of what they reflected before, all over the lobe's albedo. What
  * a mirror shows does not move with its surface: the sharper a lobe, the less counts what was seen from elsewhere. */
 #include "vpl/vpl_history_lib.glsl"
-#include "vpl/vpl_strength_lib.glsl"
 
-/* Means of fewer samples than this do not know their variance. */
-const float REFLECT_FEW = 4.0;
-/* Their deviation, as a part of their level, at this roughness; it grows with the width of the lobe's highlight, so that
+/* The deviation of means of few samples, as a part of their level, at this roughness; it grows with the width of the lobe's highlight, so that
  * the filter mixes what wide lobes show, and leaves mirrors alone. */
 const float REFLECT_ROUGHNESS = 0.1;
 const float REFLECT_UNKNOWN = 1e4;
@@ -39,17 +36,13 @@ void main()
     direct_history = history_mean(taps, direct_history_tx);
   }
   float most = pc_still != 0 ? pc_most_history : pc_most_history * smoothstep(0.0, REFLECT_STEADY, roughness);
-  float samples = min(history.w, most) + 1.0;
-  vec3 mean = mix(history.rgb, light, 1.0 / samples);
-  float strength = vpl_strength(light);
-  float moment = mix(direct_history.w, strength * strength, 1.0 / samples);
-  float level = vpl_strength(mean);
-  float variance = max(moment - level * level, 0.0) / max(samples - 1.0, 1.0);
-  if (samples < REFLECT_FEW) {
-    float width = roughness / REFLECT_ROUGHNESS;
+  HistoryJoined joined = history_joined(history, direct_history.w, light, most);
+  float variance = joined.variance;
+  if (joined.samples < HISTORY_FEW) {
+    float level = vpl_strength(joined.mean), width = roughness / REFLECT_ROUGHNESS;
     variance = level * level * min(width * width * width * width, REFLECT_UNKNOWN);
   }
-  out_history = vec4(mean, samples);
-  out_noisy = vec4(mean, variance);
-  out_direct = vec4(mix(direct_history.rgb, direct, 1.0 / samples), moment);
+  out_history = vec4(joined.mean, joined.samples);
+  out_noisy = vec4(joined.mean, variance);
+  out_direct = vec4(mix(direct_history.rgb, direct, 1.0 / joined.samples), joined.moment);
 }

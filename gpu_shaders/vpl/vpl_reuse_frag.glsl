@@ -13,9 +13,7 @@ const float REUSE_RADIUS = 6.0;
 const float REUSE_ALIKE = 0.5;
 /* Apart from the seeds of the candidates. */
 const int REUSE_SEED = 1024;
-/* Means of fewer samples than this do not know their variance. */
-const float REUSE_FEW = 4.0;
-/* Their variance is taken for this, so that only surfaces keep the filter from mixing. */
+/* The variance of means of few samples is taken for this, so that only surfaces keep the filter from mixing. */
 const float REUSE_UNKNOWN = 1e12;
 
 struct Source {
@@ -107,20 +105,11 @@ void main()
     taps = history_taps(old_surface_tx, place, at);
   }
   vec4 history = history_mean(taps, history_tx);
-  float moment = history_mean(taps, old_reservoir_tx).w;
-  float samples = min(history.w, pc_most_history) + 1.0;
-  vec3 mean = mix(history.rgb, light, 1.0 / samples);
-  float strength = vpl_strength(light);
-  moment = mix(moment, strength * strength, 1.0 / samples);
-  float level = vpl_strength(mean);
-  float variance = max(moment - level * level, 0.0) / max(samples - 1.0, 1.0);
-  if (samples < REUSE_FEW) {
-    variance = REUSE_UNKNOWN;
-  }
-  out_reservoir = vec4(intBitsToFloat(r.id), weight, r.seen, moment);
-  out_history = vec4(mean, samples);
-  out_noisy = vec4(mean, variance);
+  HistoryJoined joined = history_joined(history, history_mean(taps, old_reservoir_tx).w, light, pc_most_history);
+  out_reservoir = vec4(intBitsToFloat(r.id), weight, r.seen, joined.moment);
+  out_history = vec4(joined.mean, joined.samples);
+  out_noisy = vec4(joined.mean, joined.samples < HISTORY_FEW ? REUSE_UNKNOWN : joined.variance);
 #ifdef FIRST_HAND
-  out_direct = vec4(mix(history_mean(taps, direct_history_tx).rgb, direct, 1.0 / samples), 0.0);
+  out_direct = vec4(mix(history_mean(taps, direct_history_tx).rgb, direct, 1.0 / joined.samples), 0.0);
 #endif
 }

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from rebound.device import Shader
+from rebound.gpu_shaders.frame.tables import replace_texels
 from rebound.gpu_shaders.materials import generate
 from rebound.scene.images import ImageReader
 from rebound.scene.node_reader import read_graph
@@ -171,15 +172,6 @@ def _cells(picture, count, columns):
     return cells.reshape(-1, CELL, CELL, 3)[:count]
 
 
-def value_texture(device, values):
-    """The table of one material's values as the generated shader reads it."""
-    count = max(len(values), 1)
-    rows = -(-count // 1024)
-    texels = np.zeros((rows * 1024, 4), np.float32)
-    texels[: len(values)] = values
-    return device.texture((1024, rows), "RGBA32F", texels.reshape(rows, 1024, 4))
-
-
 def image_texture(device, image):
     """An image of the scene's, as the GPU has it."""
     size = image.pixels.shape[1::-1]
@@ -236,7 +228,7 @@ def evaluate_material(device, material, a, b, tilt=(0.0, 0.0, 1.0)):
         defines=shader.defines,
     )
     result = device.texture((CELL, CELL), "RGBA32F")
-    sent["value_tx"] = value_texture(device, read.filled.table)
+    sent["value_tx"] = replace_texels(device, read.filled.table, None)
     sent |= {f"image_{k}_tx": image_texture(device, reader.images[key]) for k, key in enumerate(read.filled.images)}
     device.fullscreen(program, device.target([result]), pc_values=0, **sent)
     return device.read(result)[..., :3]
