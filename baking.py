@@ -45,11 +45,17 @@ class _Target:
 class TransferBake:
     """A bake under way. ``step`` it until it says how it ended, then ``close`` it; to close it earlier cancels."""
 
-    def __init__(self, depsgraph, objects: Iterable, settings: BakeSettings, *, pack: bool) -> None:
-        """Raises SceneError where an object cannot be baked, or files have no place; OSError."""
+    def __init__(
+        self, depsgraph, objects: Iterable, settings: BakeSettings, *, pack: bool, blend: Path | None = None
+    ) -> None:
+        """``blend``: what the file is to be saved as, by default as it is called.
+
+        Raises SceneError where an object cannot be baked, or files have no place; OSError.
+        """
+        self._blend = blend or (Path(bpy.data.filepath) if bpy.data.filepath else None)
         self.pack = pack
         self.warnings: list[str] = []
-        self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside()
+        self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside(self._blend)
         try:
             scene = convert_scene(depsgraph, for_viewport=True)
             files = self._assign(scene, list(objects))
@@ -121,7 +127,7 @@ class TransferBake:
             if self.pack:
                 obj.rebound.transfer_image = _packed(target.file)
             else:
-                obj.rebound.transfer_file = bpy.path.relpath(str(target.file))
+                obj.rebound.transfer_file = bpy.path.relpath(str(target.file), start=str(self._folder.parent))
             obj.update_tag()
 
     def _clean(self) -> None:
@@ -135,17 +141,19 @@ def bake(
     *,
     pack: bool | None = None,
     depsgraph: Any = None,
+    blend: Path | None = None,
     each: Callable[[TransferBake], None] = lambda bake: None,
 ) -> list[str]:
     """Bake Blender objects and wait for it; lines that warn of something. By default as the scene's settings say.
 
-    ``each`` is called with the TransferBake now and then. Raises SceneError, or OSError for files, and leaves all as
+    ``blend`` is what the file will be saved as, where that is another name. ``each`` is called with the TransferBake
+    now and then. Raises SceneError, or OSError for files, and leaves all as
     it was.
     """
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     group: Any = depsgraph.scene.rebound
     work = TransferBake(
-        depsgraph, objects, settings or settings_of(group), pack=group.bake_pack if pack is None else pack
+        depsgraph, objects, settings or settings_of(group), pack=group.bake_pack if pack is None else pack, blend=blend
     )
     try:
         work.process.wait(lambda _process: each(work))
@@ -197,6 +205,8 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
         "WAVELET": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
+    if "device" in about:
+        lines.append(f"Baked on the {about['device']}")
     if "rms" in about:
         lines.append(f"Error of compression {about['rms']:.2%}, worst vertex {about['worst']:.1%}")
     return [*lines, f"{nbytes / 1e6:.1f} MB"] if nbytes else lines
@@ -230,11 +240,10 @@ def _packed(path: Path):
     return image
 
 
-def _folder_beside() -> Path:
+def _folder_beside(blend: Path | None) -> Path:
     """Where the bakes of this .blend lie."""
-    if not bpy.data.filepath:
+    if blend is None:
         raise SceneError("Save the .blend first: bakes are written beside it. Or switch Pack on")
-    blend = Path(bpy.data.filepath)
     return blend.with_name(f"{blend.stem}.bakes")
 
 

@@ -120,13 +120,15 @@ def bake_objects(
         raise ValueError(f"object {bare[0]!r} has no surface to bake")
     surfaces = gather(scene, frozenset(keys), settings.cuts if settings.bounces and settings.shadows else 0)
     caster = make_caster(surfaces.corners[surfaces.blocks], settings.rays)
-    yield Progress(0.0, "shadows", f"CPU, rays by {caster.name}")
+    device = f"CPU, rays by {caster.name}"
+    yield Progress(0.0, "shadows", device)
     instances = [by_key[key] for key in keys]
     if settings.kind is Kind.DIFFUSE:
         found = yield from _diffuse(surfaces, caster, instances, settings)
     else:
         found = yield from _one_by_one(surfaces, caster, instances, settings)
-    return {key: Bake(_about(scene, key, settings) | more, arrays) for key, (more, arrays) in found.items()}
+    facts = {"device": device}
+    return {key: Bake(_about(scene, key, settings) | facts | more, arrays) for key, (more, arrays) in found.items()}
 
 
 Found = dict[Hashable, tuple[dict[str, Any], dict[str, Array]]]

@@ -1,14 +1,15 @@
-"""What rays hit: Embree through embreex, or plain numpy where that is missing, which says so."""
+"""What rays hit: by Blender's Embree, or plain numpy where that is missing, which says so."""
 
 from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ..scene.data import Array
+from .embree import EmbreeScene
 
 _logger = logging.getLogger("rebound")  # by name: as an extension the package is bl_ext.….rebound
 
@@ -53,37 +54,23 @@ def make_caster(corners: Array, kind: str = "") -> Caster:
         if kind == "embree":
             raise
         _logger.warning(
-            "Rays are traced by numpy, many times slower: the Python package embreex is missing (%s)", error
+            "Rays are traced by numpy on the CPU, many times slower: %s. Bake with a Blender that has Cycles", error
         )
         return NumpyCaster(corners)
 
 
 class EmbreeCaster:
-    """Intel's Embree, in 32-bit floats around the middle of the scene."""
-
-    name = "embree"
+    """Embree as it comes with Blender (embree.py)."""
 
     def __init__(self, corners: Array) -> None:
-        from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415  everything works without the wheel
-        from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415
-
-        points = corners.reshape(-1, 3)
-        self._middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        self._scene: Any = EmbreeScene()
-        indices = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
-        # Kept beside the scene: Embree reads the arrays where they lie.
-        self._mesh = TriangleMesh(self._scene, (points - self._middle).astype(np.float32), indices)
-
-    def _run(self, origins: Array, directions: Array, **how: Any) -> Any:
-        start = np.ascontiguousarray(origins - self._middle, np.float32)
-        return self._scene.run(start, np.ascontiguousarray(directions, np.float32), **how)
+        self._scene = EmbreeScene(corners)
+        self.name = f"Embree {self._scene.version}"
 
     def blocked(self, origins: Array, directions: Array) -> Array:
-        return self._run(origins, directions, query="OCCLUDED") != -1
+        return self._scene.blocked(origins, directions)
 
     def hits(self, origins: Array, directions: Array) -> Hits:
-        found = self._run(origins, directions, output=True)
-        return Hits(found["primID"].astype(np.int64), found["u"], found["v"])
+        return Hits(*self._scene.hits(origins, directions))
 
 
 class NumpyCaster:

@@ -36,7 +36,7 @@ sys.modules["rebound"] = importlib.util.module_from_spec(spec)
 runpy.run_module("rebound.bake.worker", run_name="__main__", alter_sys=True)
 """
 # What the worker imports from outside; Blender keeps an extension's wheels where only its own process looks.
-_LIBRARIES = ("numpy", "OpenEXR", "embreex")
+_LIBRARIES = ("numpy", "OpenEXR")
 _NOTHING_SEEN = View(np.eye(4), np.eye(4), 1, 1)
 # Progress below this part tells nothing of how long the rest takes.
 _TELLS = 0.02

@@ -3,7 +3,7 @@
 ROW is the place of the object among the scene's instances. What happens is said in lines of JSON on the standard
 output:
 
-    {"device": "CPU, rays by embree"}           once, before the first ray
+    {"device": "CPU, rays by Embree 4.4.1"}     once, before the first ray
     {"progress": 0.25, "doing": "shadows"}      any number of them
     {"warning": "..."}                          what was done in another way than it should be
     {"done": ["FILE.exr", ...], "seconds": 12}  exit status 0

@@ -18,7 +18,7 @@ from rebound.bake.compress import compress
 from rebound.bake.glossy import glossy
 from rebound.bake.occlusion import Caster, make_caster
 from rebound.bake.surfaces import Surfaces, gather
-from rebound.bake.transfer import Result, Sampling, diffuse, finish, trace
+from rebound.bake.transfer import Result, Sampling, diffuse, finish
 from rebound.bake.wavelets import wavelet
 from rebound.benchmarks.plot import Line, chart
 from rebound.benchmarks.tables import Table, significant
@@ -45,16 +45,23 @@ def sheet(name: str, points: Array, normals: Array) -> Mesh:
     return Mesh(name, found, corners(normals), {}, "", ((0, 0, len(found) // 3),), bounds)
 
 
-def ball_on_floor(cells: int = 48) -> Scene:
-    """A ball of 0.5 m on a floor of 4 m, albedo 0.8."""
-    edge = np.linspace(-2.0, 2.0, cells + 1)
+def ball_on_floor(cells: int = 48, ball_cells: int = 0, dents: float = 0.0) -> Scene:
+    """A ball of 0.5 m on a floor of 4 m, albedo 0.8. ``dents``: how deep it is dented, in parts of its radius."""
+    edge, ball_cells = np.linspace(-2.0, 2.0, cells + 1), ball_cells or cells
     x, y = np.meshgrid(edge, edge, indexing="ij")
     floor = sheet("floor", np.stack([x, y, 0 * x], axis=-1), np.broadcast_to([0.0, 0.0, 1.0], (*x.shape, 3)))
     turn, up = np.meshgrid(
-        np.linspace(0, 2 * np.pi, cells + 1), np.linspace(1e-3, np.pi - 1e-3, cells + 1), indexing="ij"
+        np.linspace(0, 2 * np.pi, ball_cells + 1), np.linspace(1e-3, np.pi - 1e-3, ball_cells + 1), indexing="ij"
     )
     out = np.stack([np.sin(up) * np.cos(-turn), np.sin(up) * np.sin(-turn), np.cos(up)], axis=-1)
-    ball = sheet("ball", 0.5 * out + [0, 0, 0.5], out)
+    normals = out
+    if dents:
+        out = out * (1.0 - dents * np.square(np.sin(5 * turn) * np.sin(5 * up)))[..., None]
+        normals = np.cross(np.gradient(out, axis=1), np.gradient(out, axis=0))
+        normals[-1] = normals[0]  # where the sheet meets itself
+        normals *= np.sign((normals * out).sum(axis=-1, keepdims=True))
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    ball = sheet("ball", 0.5 * out + [0, 0, 0.5], normals)
     everything = Visibility.CAMERA | Visibility.SHADOW | Visibility.BOUNCE
     placed = tuple(Instance(m.key, m.key, (0,), np.eye(4), everything) for m in (floor, ball))
     return Scene({"floor": floor, "ball": ball}, placed, (Material("Grey"),))
@@ -97,24 +104,6 @@ def error_curves(light: Array, transport: haar.SparseRows, basis: Array) -> list
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
     start = time.perf_counter()
     return work(), time.perf_counter() - start
-
-
-def rays_table(surfaces: Surfaces) -> Table:
-    """How many rays a second each caster traces; numpy from fewer vertices."""
-    rows = []
-    directions = sphere.spread(1024)
-    for kind, step in (("embree", 10), ("numpy", 200)):
-        caster = make_caster(surfaces.corners, kind)
-        some = np.arange(0, len(surfaces.positions), step)
-        count = int((surfaces.normals[some] @ directions.T > 0).sum())
-        times = []
-        for needs_hits in (False, True):
-            start = time.perf_counter()
-            trace(surfaces, caster, some, directions, needs_hits)
-            times.append(count / (time.perf_counter() - start))
-        rows.append([kind, f"{times[0]:,.0f}", f"{times[1]:,.0f}", f"{FIFTY_THOUSAND * 512 / times[0]:,.0f} s"])
-    head = ["rays by", "blocked or not, a second", "what is hit, a second", "50,000 vertices, 1,024 directions"]
-    return Table("Rays", head, rows)
 
 
 def directions_table(surfaces: Surfaces, caster: Caster) -> Table:
@@ -172,7 +161,7 @@ def main() -> None:
         (PICTURES / file).write_text(chart(title, "terms of the light", "error", lines, paper=True), encoding="utf-8")
         parts.append(f"![Error against terms under {name}](images/{file})\n")
     light = skies()["a sky and a small sun"]
-    tables = [rays_table(surfaces), directions_table(surfaces, caster)]
+    tables = [directions_table(surfaces, caster)]
     tables += [wavelet_table(surfaces, caster, whole, light), compression_table(surfaces, caster)]
     content = "\n".join(parts + [table.markdown() for table in tables])
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)

@@ -58,16 +58,16 @@ def _parser() -> argparse.ArgumentParser:
 
 def _bake(arguments: argparse.Namespace) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(arguments.file.resolve()))
-    if arguments.save_as is not None:  # before the bake: files lie beside the one that names them
-        bpy.ops.wm.save_as_mainfile(filepath=str(arguments.save_as.resolve()))
     scene = bpy.context.scene
     for setting in BAKE_SETTINGS:
         value = getattr(arguments, setting.name)
         if value is not None:
             setattr(scene.rebound, setting.name, value)
-    for line in bake(_objects(scene, arguments.objects), settings_of(scene.rebound), each=_Lines()):
+    blend = (arguments.save_as or arguments.file).resolve()
+    objects = _objects(scene, arguments.objects)
+    for line in bake(objects, settings_of(scene.rebound), blend=blend, each=_Lines()):
         LOGGER.warning("%s", line)
-    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
 
 
 def _objects(scene, names: Sequence[str] | None) -> list:

@@ -321,6 +321,9 @@ def test_command_bakes_a_file_and_saves_it(saved, tmp_path):
     assert not baking.has_bake(bpy.data.objects["Box"])
     assert Path(bpy.path.abspath(floor().rebound.transfer_file)).parent == tmp_path / "b.bakes"
     assert not (tmp_path / "a.bakes").exists()
+    assert bake_command.run(["bake", path, "--objects", "Nobody", "--save-as", str(tmp_path / "b.blend")]) == 1
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "b.blend"))
+    assert state(floor()).unused == "", "a bake that failed leaves the file of before"
 
 
 @pytest.mark.parametrize(

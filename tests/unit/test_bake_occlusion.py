@@ -1,11 +1,11 @@
 """Surfaces of a scene in world space, and what rays hit on them."""
 
-import builtins
 import logging
 
 import numpy as np
 import pytest
 
+from rebound.bake import embree
 from rebound.bake.occlusion import EmbreeCaster, NumpyCaster, make_caster
 from rebound.bake.surfaces import frame_of, gather, mesh_fingerprint, mesh_vertices
 from rebound.scene.data import Image, Instance, Material, Mesh, Scene, Texture
@@ -74,19 +74,51 @@ def test_far_from_the_origin_rays_still_hit():
 
 
 def test_missing_embree_is_said(monkeypatch, caplog):
-    found = builtins.__import__
-
-    def without_embree(name, *rest, **named):
-        if name.startswith("embreex"):
-            raise ImportError("not here")
-        return found(name, *rest, **named)
-
-    monkeypatch.setattr(builtins, "__import__", without_embree)
+    monkeypatch.setattr(embree, "_files", lambda: iter(()))
     with caplog.at_level(logging.WARNING, "rebound"):
         assert make_caster(soup(3)).name == "numpy"
-    assert "embreex is missing" in caplog.text
+    assert "without the library of Embree" in caplog.text
     with pytest.raises(ImportError):
         make_caster(soup(3), "embree")
+
+
+def test_library_that_is_none_of_embree_is_said(monkeypatch, caplog, tmp_path):
+    broken = tmp_path / "libembree4.so.4"
+    broken.write_bytes(b"not a library")
+    monkeypatch.setattr(embree, "_files", lambda: iter([broken]))
+    with caplog.at_level(logging.WARNING, "rebound"):
+        assert make_caster(soup(3)).name == "numpy"
+    assert str(broken) in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("python", "library"),
+    [
+        ("5.2/python", "lib/libembree4.so.4"),
+        ("5.2/python", "blender.shared/embree4.dll"),
+        ("Resources/5.2/python", "Resources/lib/libembree4.dylib"),
+    ],
+)
+def test_library_is_found_where_blender_keeps_it(monkeypatch, tmp_path, python, library):
+    """As Blender's folders lie on Linux, Windows and macOS."""
+    file = tmp_path / library
+    file.parent.mkdir(parents=True)
+    file.touch()
+    (tmp_path / python).mkdir(parents=True)
+    monkeypatch.setattr(embree.sys, "prefix", str(tmp_path / python))
+    monkeypatch.setattr(embree.importlib.util, "find_spec", lambda name: None)
+    assert next(embree._files()) == file
+
+
+@pytest.mark.parametrize("count", [1, 15, 16, 17, 40000])
+def test_embree_answers_any_number_of_rays(count):
+    """They are told in packets of 16 and pieces of 32768."""
+    caster = EmbreeCaster(soup(50))
+    origins, towards = rays(count)
+    alone = [caster.hits(origins[i : i + 1], towards[i : i + 1]).triangles[0] for i in range(max(0, count - 40), count)]
+    found = caster.hits(origins, towards).triangles
+    assert found[-40:].tolist() == alone
+    assert np.array_equal(caster.blocked(origins, towards), found >= 0)
 
 
 def test_corners_with_one_place_and_normal_are_one_vertex():
