@@ -11,7 +11,7 @@ from .bake import lobes
 from .bake.light import Surroundings
 from .bake.live import Live, make_live
 from .bake.surfaces import frame_of, mesh_vertices
-from .device.interface import Device
+from .device.interface import Device, Target
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
 from .gpu_shaders.prt import BakedObject, BakedObjects
@@ -36,6 +36,8 @@ class BakedLight:
         self._revision = -1  # of the environment that these are
         self._drawn: list[BakedObject] = []
         self._up_to_date: tuple = ()
+        self._lit: list[Instance] = []
+        self._shown: dict[Hashable, tuple] = {}  # by Instance.key: of which coefficient there is a picture
 
     def update(self, gpu_scene: GpuScene, settings: Settings) -> bool:
         """Work out what has changed of the objects' light; whether there is any to draw."""
@@ -62,19 +64,37 @@ class BakedLight:
         world = inputs.gpu_scene.environment
         self._objects.draw(inputs, self._drawn, targets, glossy=glossy, seen=(world.lights, world.mirrored))
 
+    def view(self, inputs: FrameInputs, settings: Settings, target: Target) -> None:
+        """Draw one coefficient of each bake into ``target`` (frame.views.TRANSFER)."""
+        scene, objects = inputs.gpu_scene.scene, []
+        numbers = int(settings["show_term"]), int(settings["show_result"])
+        for instance in scene.instances:
+            if instance.transfer is None or not instance.visibility & _SEEN:
+                continue
+            live, name = self._prepare(scene, instance), ("shown", instance.key)
+            if self._shown.get(instance.key) != (instance.transfer, *numbers):
+                self._shown[instance.key] = (instance.transfer, *numbers)
+                self._objects.set_light(name, _signed(live.coefficient(*numbers)))
+            objects.append(
+                self._objects.object(instance.mesh, name, instance.world_from_object, np.eye(3), bounces=live.bounces)
+            )
+        self._objects.show(inputs, objects, target)
+
+    def end_view(self) -> None:
+        """Give back what a view made."""
+        if self._shown:
+            self._shown.clear()
+            self._objects.keep({i.mesh for i in self._lit}, {i.key for i in self._lit})
+
     def free(self) -> None:
         self._objects.free()
+        self._shown.clear()
         self._live.clear()
         self._answered.clear()
         self._drawn, self._up_to_date = [], ()
 
     def _object(self, scene: Scene, instance: Instance, settings: Mapping[str, Any]) -> BakedObject:
-        mesh, frame = scene.meshes[instance.mesh], frame_of(instance.world_from_object)
-        if not self._objects.has_mesh(mesh.key):
-            self._objects.add_mesh(mesh.key, mesh.positions, mesh_vertices(mesh)[1])
-        if instance.transfer not in self._live:
-            self._live[instance.transfer] = make_live(scene.transfers[instance.transfer])
-        live = self._live[instance.transfer]
+        live, frame = self._prepare(scene, instance), frame_of(instance.world_from_object)
         if live.coefficients > 1 and not self._objects.has_lobes:
             self._objects.set_lobes(lobe_table())
         question = (instance.transfer, frame.tobytes(), *(settings[name] for name in ("bands", "window", "terms")))
@@ -85,19 +105,35 @@ class BakedLight:
             self._objects.set_light(instance.key, answer)
             self._answered[instance.key] = question
             self.updates += 1
-        place = (mesh.key, instance.key, instance.world_from_object, frame)
+        place = (instance.mesh, instance.key, instance.world_from_object, frame)
         return self._objects.object(*place, bounces=live.bounces)
+
+    def _prepare(self, scene: Scene, instance: Instance) -> Live:
+        """Have the mesh on the GPU and the bake laid out."""
+        mesh = scene.meshes[instance.mesh]
+        if not self._objects.has_mesh(mesh.key):
+            self._objects.add_mesh(mesh.key, mesh.positions, mesh_vertices(mesh)[1])
+        if instance.transfer not in self._live:
+            self._live[instance.transfer] = make_live(scene.transfers[instance.transfer])
+        return self._live[instance.transfer]
 
     def _forget(self, lit: list[Instance]) -> None:
         """Give back what is no longer drawn."""
         keys, transfers = {i.key for i in lit}, {i.transfer for i in lit}
         self._objects.keep({i.mesh for i in lit}, keys)
+        self._lit, self._shown = lit, {}
         self._answered = {key: question for key, question in self._answered.items() if key in keys}
         self._live = {key: live for key, live in self._live.items() if key in transfers}
 
 
 def _is_lit(instance: Instance) -> bool:
     return bool(instance.visibility & _SEEN) and not instance.visibility & _NOT_LIT
+
+
+def _signed(values: np.ndarray) -> np.ndarray:
+    """(n, 1, 3) float32 colours of (n,) numbers: red above zero, blue below, full for the largest."""
+    scaled = values / max(float(np.abs(values).max(initial=0.0)), 1e-12)
+    return np.stack([np.maximum(scaled, 0), 0 * scaled, np.maximum(-scaled, 0)], axis=-1)[:, None].astype(np.float32)
 
 
 def lobe_table() -> np.ndarray:

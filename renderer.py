@@ -28,6 +28,7 @@ from .gpu_shaders.frame.views import (
     LAMPS,
     MOMENTS,
     SHOWN,
+    TRANSFER,
     UNBOUNCED,
     VIEWS,
     draw_technique_view,
@@ -137,6 +138,8 @@ class Renderer:
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         frame.provisional = technique is not None and bounced and technique.provisional
         self._accumulate(frame, inputs, indirect=bounced)
+        if shown is not TRANSFER:
+            self._baked.end_view()
         if shown is not None:
             self._show(frame, inputs, shown, settings, bounced)
         self.clock.mark("sum")
@@ -316,6 +319,17 @@ class Renderer:
     def _show(self, frame: Frame, inputs: FrameInputs, view: DebugView, settings: Settings, bounced: bool) -> None:
         """Draw what is shown in the place of the picture."""
         combined, scratch = frame.sums["combined"], frame.light.diffuse_indirect
+        if view is TRANSFER:
+            draw_technique_view(
+                self.device,
+                view,
+                frame.extras,
+                scratch,
+                combined,
+                frame.samples,
+                lambda target: self._baked.view(inputs, settings, target),
+            )
+            return
         if view in VIEWS:
             if not bounced:
                 self.device.clear(scratch)  # of an earlier sample

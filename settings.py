@@ -49,6 +49,28 @@ SETTINGS = (
         unit="number of a light",
     ),
     Setting(
+        "show_term",
+        "INT",
+        "Term",
+        "Which coefficient of the light the view of baked transfer shows: l (l + 1) + m of harmonics, or the number of "
+        "a wavelet. Higher ones tell finer detail of the surroundings apart, lower ones coarser",
+        0,
+        minimum=0,
+        maximum=24575,
+        unit="number of a coefficient",
+    ),
+    Setting(
+        "show_result",
+        "INT",
+        "Reflected Term",
+        "Glossy bakes: which coefficient of what arrives the view of baked transfer shows, l (l + 1) + m. Higher ones "
+        "are finer detail of reflections, lower ones coarser",
+        0,
+        minimum=0,
+        maximum=120,
+        unit="number of a coefficient",
+    ),
+    Setting(
         "samples",
         "INT",
         "Samples",
@@ -360,6 +382,7 @@ CHOICE_NUMBERS = {
         *("VPL_OCCLUSION", "VPL_RESOLUTION", "VPL_POOL"),
         *("VPL_MAPS", "VPL_MAP_DEPTH", "VPL_MAP_POSITION", "VPL_MAP_NORMAL", "VPL_MAP_FLUX"),
         *("RSM_RESOLUTION", "RSM_MAPS", "RSM_MAP_DEPTH", "RSM_MAP_POSITION", "RSM_MAP_NORMAL", "RSM_MAP_FLUX"),
+        "TRANSFER",
     ),
 }
 

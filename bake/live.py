@@ -34,6 +34,13 @@ class Live:
         """
         raise NotImplementedError
 
+    def coefficient(self, term: int, result: int) -> Array:
+        """(vertices,) coefficient ``term`` of the transfer, the mean of its colours; of matrices in row ``result``.
+
+        Zero where there is none of that number.
+        """
+        raise NotImplementedError
+
 
 class LiveDiffuse(Live):
     """Vectors of spherical harmonics: irradiance / pi."""
@@ -44,6 +51,9 @@ class LiveDiffuse(Live):
 
     def answer(self, light: Surroundings, frame: Array, bands: int, window: float, terms: int) -> Array:
         return _by_vectors(self._vectors, light, frame, bands, window)[:, None]
+
+    def coefficient(self, term: int, result: int) -> Array:
+        return self._vectors[..., term : term + 1].sum(axis=2).mean(axis=1)
 
 
 class LiveGlossy(Live):
@@ -80,6 +90,13 @@ class LiveGlossy(Live):
             start = end
         return found.reshape(len(found), self.coefficients, 3)
 
+    def coefficient(self, term: int, result: int) -> Array:
+        parts = self._every[..., result : result + 1, term : term + 1].sum(axis=(3, 4)).mean(axis=2)
+        found = np.empty(len(self._order), np.float32)
+        clusters = np.searchsorted(self._ends, np.arange(len(found)), side="right")
+        found[self._order] = (self._weights * parts[clusters]).sum(axis=1)
+        return found
+
 
 class LiveWavelet(Live):
     """Sparse rows of wavelets, kept by term: of a light that has few, only those are looked at."""
@@ -113,6 +130,12 @@ class LiveWavelet(Live):
         if self._bounced is not None:
             found += _by_vectors(self._bounced, light, frame, bands, window)
         return found[:, None]
+
+    def coefficient(self, term: int, result: int) -> Array:
+        if term >= len(self._ends):
+            return np.zeros(self._vertices, np.float32)
+        place = slice(self._ends[term - 1] if term else 0, self._ends[term])
+        return np.bincount(self._owners[place], self._values[place], self._vertices)
 
 
 _KINDS: dict[str, type[Live]] = {"DIFFUSE": LiveDiffuse, "GLOSSY": LiveGlossy, "WAVELET": LiveWavelet}

@@ -157,7 +157,8 @@ class REBOUND_PT_viewport(bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.menu("REBOUND_MT_viewport_show", text=shown_label(group, "viewport_show"))
-        layout.prop(group, "show_light")
+        for name in ("show_term", "show_result") if group.viewport_show == "TRANSFER" else ("show_light",):
+            layout.prop(group, name)
         layout.prop(group, "viewport_indirect")
         column = layout.column(align=True)
         column.prop(group, "viewport_split")

@@ -185,7 +185,8 @@ class REBOUND_PT_debug(ReboundPanel, bpy.types.Panel):
             split.menu(f"REBOUND_MT_{name}", text=shown_label(group, name))
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(group, "show_light")
+        for name in ("show_light", "show_term", "show_result"):
+            layout.prop(group, name)
         column = layout.column(align=True, heading="Viewport")
         for setting in (*VIEWPORT_SETTINGS, *DISPLAY_SETTINGS):
             column.prop(group, f"viewport_{setting.name}")

@@ -48,7 +48,14 @@ VARIANCE = DebugView(
     "100 % or more; grey: not known after one sample. Samples that share light (Reuse) are taken for independent: then "
     "it is a lower bound",
 )
-VIEWS = (DIRECT, INDIRECT, IRRADIANCE, ALBEDO, NORMALS, VARIANCE)
+TRANSFER = DebugView(
+    "TRANSFER",
+    "Transfer Coefficient",
+    "One coefficient of each object's baked light transfer, chosen by Term and Reflected Term: red where it is "
+    "positive, blue where negative, full where it is largest on the object. Grey has no bake that fits",
+    averaged=True,
+)
+VIEWS = (DIRECT, INDIRECT, IRRADIANCE, ALBEDO, NORMALS, VARIANCE, TRANSFER)
 
 # Pictures that a view, or the split, wants beside the sums. SHOWN: the view's own, its sum over the samples.
 SHOWN, LAMPS, UNBOUNCED, MOMENTS = "shown", "lamps", "unbounced", "moments"

@@ -29,6 +29,8 @@ __all__ = ["SHADERS", "BakedObject", "BakedObjects"]
 
 # Texels in a row of a texture of vertices.
 ROW_TEXELS = 2048
+# What a view of bakes shows where there is none.
+NOT_BAKED = (0.05, 0.05, 0.05)
 # Nothing else: what is seen through an object that lets light pass has its own light.
 OVER_GBUFFER = DrawState(depth_test="EQUAL")
 
@@ -109,6 +111,21 @@ class BakedObjects:
 
         ``seen``: whether the world lights diffusely, and whether it is mirrored.
         """
+        diffuse, mirrored = self._draw(inputs, objects)
+        if seen[0]:
+            self.device.fullscreen(RESOLVE, targets.diffuse_direct, state=ADD, sum_tx=diffuse, pc_weight=1.0)
+        if glossy and seen[1]:
+            self.device.fullscreen(RESOLVE, targets.glossy_direct, state=ADD, sum_tx=mirrored, pc_weight=1.0)
+
+    def show(self, inputs: FrameInputs, objects: list[BakedObject], target: Target) -> None:
+        """Draw the objects' light as it is into a picture, over grey."""
+        self.device.clear(target, (*NOT_BAKED, 1.0))
+        shown, _ = self._draw(inputs, objects)
+        state = DrawState(blend="ALPHA_PREMULT")
+        self.device.fullscreen(RESOLVE, target, state=state, sum_tx=shown, pc_weight=1.0)
+
+    def _draw(self, inputs: FrameInputs, objects: list[BakedObject]) -> tuple[Texture, Texture]:
+        """What the objects send by their matt and by their glossy side."""
         pictures, over = self._targets(inputs)
         self.device.clear(pictures)
         for one in objects:
@@ -136,10 +153,7 @@ class BakedObjects:
                 **(looks if is_full else {}),
             )
         diffuse, mirrored = pictures.colors
-        if seen[0]:
-            self.device.fullscreen(RESOLVE, targets.diffuse_direct, state=ADD, sum_tx=diffuse, pc_weight=1.0)
-        if glossy and seen[1]:
-            self.device.fullscreen(RESOLVE, targets.glossy_direct, state=ADD, sum_tx=mirrored, pc_weight=1.0)
+        return diffuse, mirrored
 
     def free(self) -> None:
         self.keep(set(), set())

@@ -161,3 +161,29 @@ def test_harmonics_of_the_shader_are_those_of_the_bake(headless_device):
     for first in range(0, 36, 4):
         found = evaluate(headless_device, [path], f"at(d.xyz, {first})", {"d": directions}, files=library)
         np.testing.assert_allclose(found, wanted[:, first : first + 4], atol=2e-6)
+
+
+# --- one coefficient --------------------------------------------------------------------------------------------------
+
+
+def test_view_of_a_coefficient_is_red_above_zero_and_blue_below(studio):
+    """Coefficient 3 grows along x: what faces that way is red, its other side blue; without a bake there is grey."""
+    alone = baked(scene([sphere("ball", (0, 0, 0), 0.5, rings=24)], world=SKY), QUICK)
+    view, settings = ortho(32, 32, 1.2), {"show": "TRANSFER", "show_term": 3}
+    found = picture(studio, alone, 2, view, **settings)
+    across = found[16, 4:28]
+    assert across[-1, 0] > 0.7 and across[-1, 2] == 0
+    assert across[0, 2] > 0.7 and across[0, 0] == 0
+    assert (np.diff(across[:, 0] - across[:, 2]) > 0).all()
+    np.testing.assert_allclose(found[0, 0], 0.05, atol=1e-3)
+    np.testing.assert_allclose(picture(studio, unbaked(alone), 2, view, **settings), 0.05, atol=1e-3)
+    assert (picture(studio, alone, 2, view, show="TRANSFER", show_term=0)[10:22, 10:22, 0] > 0.95).all()
+
+
+def test_view_of_a_coefficient_leaves_no_trace(studio):
+    before = picture(studio, BAKED)
+    memory = studio.renderer.statistics()["gpu_bytes"]
+    for term in (0, 4):
+        picture(studio, BAKED, show="TRANSFER", show_term=term)
+    np.testing.assert_array_equal(picture(studio, BAKED), before)
+    assert studio.renderer.statistics()["gpu_bytes"] == memory

@@ -168,3 +168,22 @@ def test_smooth_lobe_is_the_mirror():
 def test_rough_lobe_leans_from_the_mirrored_direction_to_the_normal():
     axes = [lobes.ggx_seen(6, roughness, 0.3)[1] for roughness in (0.1, 0.4, 0.7, 1.0)]
     assert all(a < b for a, b in zip(axes, axes[1:], strict=False)) and axes[-1] > 0.45
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_coefficients_are_those_of_the_transfer(kind):
+    """Each number of it, the mean of the colours; beyond the last there is nothing."""
+    baked = transfer(kind, bands=3, result_bands=2, texels=8, error=0.0)
+    live, bake = make_live(baked), Bake(baked.about, baked.arrays)
+    if kind is Kind.DIFFUSE:
+        rows = baked.arrays["diffuse"].astype(np.float64).mean(axis=1)[:, None]
+    elif kind is Kind.GLOSSY:
+        rows = glossy_matrices(bake).rows().reshape(-1, *baked.about["matrix"]).mean(axis=1)
+    else:
+        rows = wavelet_rows(bake).dense()[:, None]
+    for result, term in ((0, 0), (0, 5), (2, 7)):
+        right = rows[:, min(result, rows.shape[1] - 1), term]
+        np.testing.assert_allclose(live.coefficient(term, result), right, atol=1e-5)
+    assert not live.coefficient(24575, 0).any()
+    if kind is Kind.GLOSSY:
+        assert not live.coefficient(0, 120).any()
