@@ -26,7 +26,8 @@ class Frame:
     gbuffer: GBuffer
     gbuffer_target: Target
     emission_target: Target  # the G-buffer's emission alone
-    tint_target: Target  # all of it that colours what is seen
+    passed_target: Target  # what is passed on the way to what is seen
+    tint_target: Target  # that, and all of the G-buffer that it colours
     background_target: Target  # what of the G-buffer means something where there is no surface
     light: LightTargets
     direct_target: Target  # both direct ones of ``light``
@@ -50,6 +51,7 @@ class Frame:
         targets = (
             self.gbuffer_target,
             self.emission_target,
+            self.passed_target,
             self.tint_target,
             self.background_target,
             *self._lights,
@@ -62,6 +64,7 @@ class Frame:
         textures = (
             *self.gbuffer.colors,
             self.gbuffer.depth,
+            self.gbuffer.passed,
             *(target.colors[0] for target in self._lights),
             *self.sums.values(),
             *self.geometry,
@@ -87,6 +90,7 @@ def new_frame(device: Device, width: int, height: int, passes: Sequence[str]) ->
         normal=texture("RGBA32F"),
         specular=texture("RGBA16F"),
         depth=texture("DEPTH32F"),
+        passed=texture("RGBA16F"),
     )
     light = LightTargets(**{name: device.target([texture("RGBA32F")]) for name in LIGHTS})
     direct, indirect = ([getattr(light, f"{kind}_{way}").colors[0] for kind in ("diffuse", "glossy")] for way in WAYS)
@@ -102,7 +106,8 @@ def new_frame(device: Device, width: int, height: int, passes: Sequence[str]) ->
         gbuffer,
         device.target(gbuffer.colors, gbuffer.depth),
         device.target([gbuffer.emission]),
-        device.target([gbuffer.albedo, gbuffer.emission, gbuffer.specular], gbuffer.depth),
+        device.target([gbuffer.passed]),
+        device.target([gbuffer.albedo, gbuffer.emission, gbuffer.specular, gbuffer.passed], gbuffer.depth),
         device.target([gbuffer.albedo, gbuffer.position], gbuffer.depth),
         light,
         device.target(direct),

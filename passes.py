@@ -69,6 +69,9 @@ PASSES = (
     _lit("glossy", "Gloss", "direct"),
     _lit("glossy", "Gloss", "indirect"),
     _plain("glossy_color", "Glossy Color", "GlossCol", "use_pass_glossy_color", "RGB"),
+    _lit("transmission", "Trans", "direct"),
+    _lit("transmission", "Trans", "indirect"),
+    _plain("transmission_color", "Transmission Color", "TransCol", "use_pass_transmission_color", "RGB"),
     _plain("emission", "Emission", "Emit", "use_pass_emit", "RGB"),
     _plain("environment", "Environment", "Env", "use_pass_environment", "RGB"),
 )  # fmt: skip

@@ -7,7 +7,7 @@ can show progress, keep an interface alive, and cancel between two pieces.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from .gpu_shaders import TECHNIQUES
 from .gpu_shaders.frame.clock import Clock
 from .gpu_shaders.frame.direct import DirectLight
 from .gpu_shaders.frame.draws import ADD, draw_scene, visible_draws
-from .gpu_shaders.frame.inputs import FrameInputs
+from .gpu_shaders.frame.inputs import FrameInputs, GBuffer
 from .gpu_shaders.frame.pixel_filter import pixel_offset
 from .gpu_shaders.frame.reflective_maps import ReflectiveShadowMaps
 from .gpu_shaders.frame.shaders import GBUFFER, GEOMETRY, RESOLVE, TINT, accumulate
@@ -113,6 +113,8 @@ class Renderer:
         shown = shown_view(settings)
         frame.extras.keep(needed(shown, split=bool(settings["split"])))
         passed = gpu_scene.seen_through
+        if passed:
+            self.device.clear(frame.passed_target, color=(1.0, 1.0, 1.0, 1.0))
         if passed and not gpu_scene.environment.has_background:
             self.device.clear(frame.emission_target, color=(*_background(gpu_scene), 0.0))
         self._draw_gbuffer(frame, inputs)
@@ -133,7 +135,6 @@ class Renderer:
         # A view of what a technique does is asked of one that does it.
         bounced = technique is not None and (bool(settings["indirect"]) or shown in technique.views)
         if technique is not None and bounced:
-            self.device.clear(frame.indirect_target if frame.is_glossy else frame.light.diffuse_indirect)
             for done in technique.indirect(inputs, settings.of(technique.id), frame.light):
                 yield DIRECT_DONE + (INDIRECT_DONE - DIRECT_DONE) * done
         frame.provisional = technique is not None and bounced and technique.provisional
@@ -149,9 +150,11 @@ class Renderer:
 
     def texture(self, frame: Frame) -> Texture:
         """RGBA32F mean of the picture so far, or of the view in its place; for the screen, until the next call."""
+        picture = frame.extras.texture(SHOWN) or frame.sums["combined"]
+        if frame.samples == 1:
+            return picture
         if not frame.is_resolved:  # a redraw where nothing changed has it already
             weight = 1.0 / frame.samples if frame.samples else 0.0
-            picture = frame.extras.texture(SHOWN) or frame.sums["combined"]
             self.device.fullscreen(RESOLVE, frame.resolved_target, sum_tx=picture, pc_weight=weight)
             frame.is_resolved = True
         return frame.resolved
@@ -300,18 +303,15 @@ class Renderer:
         indirect: bool,
     ) -> None:
         """Draw the sample into ``targets``, by the sums in their slots."""
-        gbuffer, scene = frame.gbuffer, inputs.gpu_scene.scene
-        light = {name: getattr(frame.light, name).colors[0] for name in LIGHTS}
-        pictures = {**light, **{name: getattr(gbuffer, name) for name in ("albedo", "emission", "position", "normal")}}
-        given: dict[str, Any] = {
-            f"{name}_tx": texture for name, texture in (*pictures.items(), ("specular", gbuffer.specular))
-        }
+        scene, passed = inputs.gpu_scene.scene, bool(inputs.gpu_scene.seen_through)
+        given: dict[str, Any] = {f"{name}_tx": getattr(frame.light, name).colors[0] for name in LIGHTS}
+        given |= {f"{field.name}_tx": getattr(frame.gbuffer, field.name) for field in fields(GBuffer)}
         color = _background(inputs.gpu_scene)
         given["pc_background"] = (0.0, 0.0, 0.0, 0.0) if scene.film_transparent else (*color, 1.0)
-        panorama = _has_panorama(inputs.gpu_scene) or bool(inputs.gpu_scene.seen_through and not scene.film_transparent)
+        panorama = _has_panorama(inputs.gpu_scene) or (passed and not scene.film_transparent)
         given["pc_eye"] = inputs.eye
         for sums, target in targets.items():
-            shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect, panorama=panorama)
+            shader = accumulate(sums, glossy=frame.is_glossy, indirect=indirect, panorama=panorama, passed=passed)
             wanted = (*shader.samplers, *shader.constants)
             resources = {name: given[name] for name in wanted}
             self.device.fullscreen(shader, target, state=state, **resources)

@@ -87,7 +87,8 @@ class Technique(Protocol):
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """Add this sample's indirect light to ``targets``.
 
-        The indirect ones are zero before and may be overwritten; the direct ones hold the sample's direct light.
+        The direct ones hold the sample's direct light. The indirect ones may hold what an earlier sample left: the
+        technique draws over all of the diffuse one, and of the glossy one where the scene is glossy, or clears them.
 
         ``settings`` holds this technique's values by their short names. Yields its progress (0..1) after every
         bounded piece of GPU work, so that a caller can show it and cancel between two pieces.

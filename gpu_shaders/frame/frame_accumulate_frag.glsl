@@ -38,26 +38,43 @@ void main()
   float luminance = dot(combined, vec3(0.2126, 0.7152, 0.0722));
   out_moments = vec4(luminance, luminance * luminance, 0.0, 0.0);
 #endif
+#ifdef PASSED
+  /* As in Cycles, what is seen through glass is the glass's, whatever it is there. */
+  vec4 passed = texelFetch(passed_tx, pixel, 0);
+  float straight = passed.a;
+#else
+  vec4 passed = vec4(1.0);
+  float straight = 1.0;
+#endif
+#ifdef WANT_TRANSMISSION_DIRECT
+  out_transmission_direct = vec4((1.0 - straight) * (emission + environment), 0.0);
+#endif
+#ifdef WANT_TRANSMISSION_INDIRECT
+  out_transmission_indirect = vec4((1.0 - straight) * (direct + indirect + glossy_direct + glossy_indirect), 0.0);
+#endif
+#ifdef WANT_TRANSMISSION_COLOR
+  out_transmission_color = vec4((1.0 - straight) * passed.rgb, 0.0);
+#endif
 #ifdef WANT_DIFFUSE_DIRECT
-  out_diffuse_direct = vec4(direct, 0.0);
+  out_diffuse_direct = vec4(straight * direct, 0.0);
 #endif
 #ifdef WANT_DIFFUSE_INDIRECT
-  out_diffuse_indirect = vec4(indirect, 0.0);
+  out_diffuse_indirect = vec4(straight * indirect, 0.0);
 #endif
 #ifdef WANT_DIFFUSE_COLOR
-  out_diffuse_color = vec4(albedo.rgb, 0.0);
+  out_diffuse_color = vec4(straight * albedo.rgb, 0.0);
 #endif
 #ifdef WANT_EMISSION
-  out_emission = vec4(emission, 0.0);
+  out_emission = vec4(straight * emission, 0.0);
 #endif
 #ifdef WANT_ENVIRONMENT
-  out_environment = vec4(environment, 0.0);
+  out_environment = vec4(straight * environment, 0.0);
 #endif
 #ifdef WANT_GLOSSY_DIRECT
-  out_glossy_direct = vec4(glossy_direct, 0.0);
+  out_glossy_direct = vec4(straight * glossy_direct, 0.0);
 #endif
 #ifdef WANT_GLOSSY_INDIRECT
-  out_glossy_indirect = vec4(glossy_indirect, 0.0);
+  out_glossy_indirect = vec4(straight * glossy_indirect, 0.0);
 #endif
 #ifdef WANT_GLOSSY_COLOR
   out_glossy_color = vec4(0.0);
@@ -67,7 +84,7 @@ void main()
     vec3 P = texelFetch(position_tx, pixel, 0).xyz;
     vec3 V = math_toward(P, pc_eye);
     vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
-    out_glossy_color = vec4(bxdf_albedo(specular.rgb, specular.a, dot(N, V)), 0.0);
+    out_glossy_color = vec4(straight * bxdf_albedo(specular.rgb, specular.a, dot(N, V)), 0.0);
   }
 #endif
 #endif

@@ -13,4 +13,6 @@ void main()
   out_albedo = tint;
   out_emission = tint;
   out_specular = tint;
+  float straight = (surface.transparent.r + surface.transparent.g + surface.transparent.b) / 3.0;
+  out_passed = vec4(tint.rgb, mean > 0.0 ? clamp(straight / mean, 0.0, 1.0) : 1.0);
 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...device.interface import Target, Texture
+from ...device.interface import Device, Target, Texture
 from ...scene.data import View
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ class GBuffer:
     RGBA32F: shading normal and geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F:
     specular reflectance at normal incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the
     square root of GGX's alpha.
+    ``passed`` RGBA16F, where the scene has anything that light passes: colour of what lies before that; a: the part of
+    it that passed as if nothing was there, and not through glass.
     Where there is no surface only ``albedo`` and ``position`` hold something: zero.
     """
 
@@ -44,6 +46,7 @@ class GBuffer:
     normal: Texture
     specular: Texture
     depth: Texture
+    passed: Texture
 
     @property
     def colors(self) -> Sequence[Texture]:
@@ -62,6 +65,11 @@ class LightTargets:
     diffuse_indirect: Target
     glossy_direct: Target
     glossy_indirect: Target
+
+    def clear_indirect(self, device: Device, *, glossy: bool) -> None:
+        """Forget what an earlier sample left; in the ``glossy`` target, too."""
+        for target in (self.diffuse_indirect, self.glossy_indirect)[: 1 + glossy]:
+            device.clear(target)
 
 
 def _unmarked(_name: str) -> None:

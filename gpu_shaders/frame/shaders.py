@@ -17,6 +17,9 @@ SUMS = (
     "glossy_direct",
     "glossy_indirect",
     "glossy_color",
+    "transmission_direct",
+    "transmission_indirect",
+    "transmission_color",
 )
 
 MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3"}
@@ -57,7 +60,7 @@ TINT = Shader(
     fragment="frame/frame_tint_frag.glsl",
     inputs=MESH_INPUTS,
     varyings=MESH_VARYINGS,
-    outputs={"out_albedo": "VEC4", "out_emission": "VEC4", "out_specular": "VEC4"},
+    outputs={"out_albedo": "VEC4", "out_emission": "VEC4", "out_specular": "VEC4", "out_passed": "VEC4"},
     samplers=MESH_SAMPLERS,
     structs=(INSTANCE, MATERIAL),
     constants={
@@ -152,18 +155,23 @@ DIRECT = {
 }
 
 
-def accumulate(sums: Sequence[str], *, glossy: bool, indirect: bool, panorama: bool = False) -> Shader:
+def accumulate(
+    sums: Sequence[str], *, glossy: bool, indirect: bool, panorama: bool = False, passed: bool = False
+) -> Shader:
     """Add a sample to up to six ``sums``: of SUMS, or "moments" (luminance, its square).
 
     Without ``glossy`` or ``indirect`` that light is taken for none. ``panorama``: the background is more than one
-    colour, and stands in the G-buffer's emission.
+    colour, and stands in the G-buffer's emission. ``passed``: some of it all may be seen through glass.
     """
+    passed = passed and not {*sums} <= {"combined", "moments"}
     light = ["diffuse_direct", *(["diffuse_indirect"] if indirect else [])]
     light += ["glossy_direct", *(["glossy_indirect"] if indirect else [])] if glossy else []
     albedo = glossy and "glossy_color" in sums
     samplers = ["albedo", "emission", *light, *(["position", "normal", "specular"] if albedo else [])]
+    samplers += ["passed"] if passed else []
     defines = [f"WANT_{name.upper()}" for name in sums]
-    defines += [name for name, wanted in (("GLOSSY", glossy), ("INDIRECT", indirect), ("PANORAMA", panorama)) if wanted]
+    kinds = {"GLOSSY": glossy, "INDIRECT": indirect, "PANORAMA": panorama, "PASSED": passed}
+    defines += [name for name, wanted in kinds.items() if wanted]
     return Shader(
         name="_".join(["frame_accumulate", *(d.lower() for d in defines if "_" not in d), sums[0], str(len(sums))]),
         fragment="frame/frame_accumulate_frag.glsl",
@@ -207,7 +215,7 @@ SPLIT = Shader(
 
 # The accumulations of a viewport, and of a final render with all passes.
 _ACCUMULATE = tuple(
-    accumulate(sums, glossy=lit, indirect=lit, panorama=panorama)
+    accumulate(sums, glossy=lit, indirect=lit, panorama=panorama, passed=panorama)
     for sums in (SUMS[:1], SUMS[:6], SUMS[6:], ("moments",))
     for lit, panorama in ((False, False), (True, False), (True, True))
 )

@@ -108,13 +108,14 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
   vec3 slope = mix(direction, vec3(1e-9), lessThan(abs(direction), vec3(1e-9)));
   vec3 inverse = 1.0 / slope;
   float way = 0.0;
-  float met = voxel_trace_grid(voxel_place(0), origin, slope, inverse, reach, way);
-  reach = met >= 0.0 ? met : reach;
-  for (int grid = 1; grid <= voxel_grid.outer_count && way < reach; grid++) {
+  float met = -1.0;
+  int grid = 0;
+  do {
     float found = voxel_trace_grid(voxel_place(grid), origin, slope, inverse, reach, way);
     met = found >= 0.0 ? found : met;
     reach = found >= 0.0 ? found : reach;
-  }
+    grid++;
+  } while (grid <= voxel_grid.outer_count && way < reach);
   return met;
 }
 
@@ -141,10 +142,9 @@ float voxel_edge_at(vec3 P)
   return voxel_place_at(P).edge;
 }
 
-/* Whether something is in the voxel that a point lies in; false outside all grids. */
-bool voxel_occupied(vec3 P)
+/* Whether something is in the voxel of a grid that a point lies in; false outside it. */
+bool voxel_occupied(VoxelPlace place, vec3 P)
 {
-  VoxelPlace place = voxel_place_at(P);
   ivec3 voxel = ivec3(floor((P - place.origin) / place.edge));
   if (any(lessThan(voxel, ivec3(0))) || any(greaterThanEqual(voxel, ivec3(place.size)))) {
     return false;
@@ -163,32 +163,39 @@ float voxel_clearance(vec3 unit_normal)
 /* Where a ray from a surface may start without meeting the surface's own voxels, on the side that its unit normal
  * points to: 1.0 (along an axis) to 1.2 edges off it. Beside a corner that is in the other surface's voxels. Outside
  * the finest grid a plane along an axis is left as closely as in it where the layer of its voxels ends with it. */
-vec3 voxel_start(vec3 P, vec3 geometric_normal)
+vec3 voxel_start_in(VoxelPlace place, vec3 P, vec3 geometric_normal)
 {
   float clearance = voxel_clearance(geometric_normal);
-  float edge = voxel_edge_at(P);
-  vec3 start = P + clearance * edge * geometric_normal;
+  vec3 start = P + clearance * place.edge * geometric_normal;
   vec3 n = abs(geometric_normal);
-  if (edge > voxel_grid.edge && max(n.x, max(n.y, n.z)) > VOXEL_ALONG_AXIS) {
-    vec3 close = P + max(clearance * voxel_grid.edge, VOXEL_FLUSH_START * edge) * geometric_normal;
-    return voxel_occupied(close) ? start : close;
+  if (place.edge > voxel_grid.edge && max(n.x, max(n.y, n.z)) > VOXEL_ALONG_AXIS) {
+    vec3 close = P + max(clearance * voxel_grid.edge, VOXEL_FLUSH_START * place.edge) * geometric_normal;
+    return voxel_occupied(place, close) ? start : close;
   }
   return start;
+}
+
+vec3 voxel_start(vec3 P, vec3 geometric_normal)
+{
+  return voxel_start_in(voxel_place_at(P), P, geometric_normal);
 }
 
 /* The same for a point known to be seen from the unit direction `seen_from` (the camera's; the light's, for a point of
  * its map): beside a corner it moves that way out of the other surface's voxels, which tell nothing of their two sides. */
 vec3 voxel_start_seen(vec3 P, vec3 geometric_normal, vec3 seen_from)
 {
-  vec3 start = voxel_start(P, geometric_normal);
-  float edge = voxel_edge_at(P);
-  for (int steps = 0; steps <= VOXEL_ESCAPES; steps++) {
-    vec3 moved = start + float(steps) * VOXEL_ESCAPE * edge * seen_from;
-    if (!voxel_occupied(moved)) {
-      return moved;
-    }
-  }
-  return start;
+  VoxelPlace place = voxel_place_at(P);
+  vec3 start = voxel_start_in(place, P, geometric_normal);
+  vec3 step = VOXEL_ESCAPE * place.edge * seen_from;
+  int steps = 0;
+  vec3 moved;
+  bool occupied;
+  do {
+    moved = start + float(steps) * step;
+    occupied = voxel_occupied(place, moved);
+    steps++;
+  } while (occupied && steps <= VOXEL_ESCAPES);
+  return occupied ? start : moved;
 }
 
 /* Whether nothing lies between two surface points whose unit normals point to the side that is asked about. Points

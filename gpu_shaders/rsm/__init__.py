@@ -154,6 +154,7 @@ class Rsm:
     def indirect(self, inputs: FrameInputs, settings: Mapping[str, Value], targets: LightTargets) -> Iterator[float]:
         """One diffuse bounce, and the world's light; see ``Technique.indirect``."""
         target = targets.diffuse_indirect
+        targets.clear_indirect(self.device, glossy=inputs.gpu_scene.is_glossy)
         for done in self._world.draw(inputs, targets):
             yield WORLD_DONE * done
         inputs.mark("world")

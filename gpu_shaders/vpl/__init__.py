@@ -81,6 +81,7 @@ class Vpl:
         inputs.mark("light maps")
         if not self.sources.tiles:
             self.gathering.forget()  # or light of before the last lamp went would be waited for without end
+            targets.clear_indirect(self.device, glossy=gpu_scene.is_glossy)
             return
         for done in self.voxels.update(gpu_scene, int(settings["voxels"])):
             yield MAPS_DONE + (VOXELS_DONE - MAPS_DONE) * done

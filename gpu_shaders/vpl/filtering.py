@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...device.interface import Device, Target, Texture
+from ...device.interface import Device, DrawState, Target, Texture
 from ..frame.draws import ADD
 from ..frame.inputs import FrameInputs
 from .shaders import ATROUS, UPSAMPLE
@@ -76,13 +76,20 @@ class Upsampling:
         if glossy:
             self._given |= {"specular_color_tx": inputs.gbuffer.specular, "pc_eye": inputs.eye}
 
+    def cover(self, light: Texture, target: Target) -> None:
+        """Make the light of the gathering pixels that of all."""
+        self._draw(light, target, DrawState(), 1.0)
+
     def add(self, light: Texture, target: Target, gain: float = 1.0) -> None:
         """Add ``gain`` times the light of the gathering pixels to that of all."""
-        self.device.fullscreen(self._shader, target, state=ADD, light_tx=light, pc_gain=gain, **self._given)
+        self._draw(light, target, ADD, gain)
 
     def share_out(self, light: Texture, direct: list[Texture], indirect_target: Target, direct_target: Target) -> None:
-        """Add all light to both targets, its ``direct`` part to the second."""
-        self.add(light, indirect_target)
+        """Cover the first target with all light but its ``direct`` part, and add that to the second."""
+        self.cover(light, indirect_target)
         for part in direct:
             self.add(part, indirect_target, gain=-1.0)
             self.add(part, direct_target)
+
+    def _draw(self, light: Texture, target: Target, state: DrawState, gain: float) -> None:
+        self.device.fullscreen(self._shader, target, state=state, light_tx=light, pc_gain=gain, **self._given)

@@ -170,8 +170,9 @@ class Gathering:
             up.share_out(light, direct, targets.diffuse_indirect, targets.diffuse_direct)
         else:
             history = 0.0
-            for light, target in zip(grid.gathered, (targets.diffuse_indirect, targets.diffuse_direct), strict=True):
-                up.add(light, target)
+            indirect, direct = grid.gathered
+            up.cover(indirect, targets.diffuse_indirect)
+            up.add(direct, targets.diffuse_direct)
         inputs.mark("gather")
         if glossy:
             yield FILTER_DONE

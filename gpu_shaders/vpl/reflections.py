@@ -54,7 +54,7 @@ class Reflections:
         )
         up = Upsampling(self.device, inputs, surface, stride, offset, glossy=True)
         if not mean:
-            up.add(self._rays[0], targets.glossy_indirect)
+            up.cover(self._rays[0], targets.glossy_indirect)
             up.add(self._rays[1], targets.glossy_direct)
             return
         self.device.fullscreen(

@@ -19,17 +19,20 @@ void main()
   if (place.w == 0.0) {
     return;
   }
-  for (int i = 0; i < pc_rounds; i++) {
+  vec3 origin = voxel_start_seen(place.xyz, N, N);
+  int i = 0;
+  do {
     bool visible;
     vec3 carried;
     vec3 from_sky;
     vec3 emitted;
-    Reservoir r = candidates_choose(place.xyz, N, N, N, point + CACHE_PIXEL, i, vpl_frame.kinds, visible, carried,
+    Reservoir r = candidates_choose(place.xyz, N, N, origin, point + CACHE_PIXEL, i, vpl_frame.kinds, visible, carried,
                                     from_sky, emitted);
-    vec3 light = candidates_light(r, visible, place.xyz, N, N, N);
+    vec3 light = candidates_light(r, visible, place.xyz, N, origin);
     float further = float(vpl_frame.kinds >> SOURCE_CACHE & 1);
     out_sum += vec4(light + emitted + (further > 0.0 ? carried : min(carried, CACHE_LEAST)), 1.0);
     bool is_sky = r.id != 0 && vpl_id_kind(r.id) == SOURCE_SKY;
     out_sky += vec4((is_sky ? light : vec3(0.0)) + further * from_sky, 1.0);
-  }
+    i++;
+  } while (i < pc_rounds);
 }

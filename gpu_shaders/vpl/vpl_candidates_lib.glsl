@@ -105,53 +105,63 @@ vec4 candidates_cube(vec3 P, out int level)
   return candidates_cube_of(level);
 }
 
+/* Texel of the cache's point at `place`, out of one for each way that the surface may face, whose plane the hit of a ray
+ * lies on best and no farther off than `nearest`; or -1. */
+ivec2 candidates_cached(vec3 hit, vec3 direction, vec3 place, int level, float nearest)
+{
+  ivec2 best = ivec2(-1);
+  for (int axis = 0; axis < 3; axis++) {
+    int point = index_point(cache_index_tx, level, place, index_side(axis, -direction[axis]));
+    ivec2 texel = index_atlas_texel(vpl_frame.cache, max(point, 0));
+    vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
+    float off = abs(dot(texelFetch(position_area_tx, texel, 0).xyz - hit, n));
+    if (point >= 0 && vpl_frame.cache.z > 0.0 && dot(n, direction) < 0.0 && off < nearest) {
+      nearest = off;
+      best = texel;
+    }
+  }
+  return best;
+}
+
 /* Radiance that the cache holds for what a ray hit after `far`, and the part of it that came from the sky: that of the
  * point whose plane the hit lies on best, out of one for each way that the surface may face, if nothing is between it and
  * the hit. The cell is jittered, so that over many rays the cells' values blend; cells that know nothing of the hit are
  * passed over. Where all do, it is not `known`: what is hidden is never believed, or light would pass walls. */
 vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out bool known, out vec3 from_sky)
 {
-  known = true;
-  from_sky = vec3(0.0);
   float edge = voxel_edge_at(hit);
   int level;
   vec4 cube = candidates_cube(hit, level);
   vec3 before = hit - min(2.0 * edge, far + 0.45 * edge) * direction;
-  int attempts = CANDIDATES_ATTEMPTS + vpl_frame.index_levels - 1;
-  for (int attempt = 0; attempt < attempts && vpl_frame.cache.z > 0.0; attempt++) {
-    if (attempt >= CANDIDATES_ATTEMPTS && level < vpl_frame.index_levels - 1) {
-      level++; /* points of a huge ground lie many of these cells apart */
-      cube = candidates_cube_of(level);
-    }
-    vec3 aside = fract(noise + float(attempt) * vec3(0.8191725, 0.6710436, 0.5497005)) - 0.5;
-    vec3 place = index_place(cube, hit) + aside;
-    float nearest = CANDIDATES_VOXELS * edge + CANDIDATES_OFF_PLANE / cube.w;
-    ivec2 best = ivec2(-1);
-    for (int axis = 0; axis < 3; axis++) {
-      int point = index_point(cache_index_tx, level, place, index_side(axis, -direction[axis]));
-      if (point < 0) {
-        continue;
+  int attempts = vpl_frame.cache.z > 0.0 ? CANDIDATES_ATTEMPTS + vpl_frame.index_levels - 1 : 0;
+  int attempt = 0;
+  ivec2 answer = ivec2(-1);
+  do {
+    ivec2 best;
+    do {
+      if (attempt >= CANDIDATES_ATTEMPTS && level < vpl_frame.index_levels - 1) {
+        level++; /* points of a huge ground lie many of these cells apart */
+        cube = candidates_cube_of(level);
       }
-      ivec2 texel = index_atlas_texel(vpl_frame.cache, point);
-      vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
-      float off = abs(dot(texelFetch(position_area_tx, texel, 0).xyz - hit, n));
-      if (dot(n, direction) < 0.0 && off < nearest) {
-        nearest = off;
-        best = texel;
-      }
+      vec3 aside = fract(noise + float(attempt) * vec3(0.8191725, 0.6710436, 0.5497005)) - 0.5;
+      best = candidates_cached(hit, direction, index_place(cube, hit) + aside, level,
+                               CANDIDATES_VOXELS * edge + CANDIDATES_OFF_PLANE / cube.w);
+      attempt++;
+    } while (best.x < 0 && attempt < attempts);
+    if (best.x >= 0) {
+      vec3 n = texelFetch(normal_kind_tx, best, 0).xyz;
+      bool clear = voxel_clear(before, voxel_start(texelFetch(position_area_tx, best, 0).xyz, n));
+      answer = clear ? best : answer;
     }
-    if (best.x < 0) {
-      continue;
-    }
-    vec3 n = texelFetch(normal_kind_tx, best, 0).xyz;
-    if (voxel_clear(before, voxel_start(texelFetch(position_area_tx, best, 0).xyz, n))) {
-      vec4 sum = texelFetch(cache_sky_tx, best - ivec2(vpl_frame.cache.xy), 0);
-      from_sky = sum.rgb / max(sum.w, 1.0) * texelFetch(specular_tx, best, 0).rgb; /* the cache's reflectance */
-      return index_radiance(position_area_tx, flux_tx, best);
-    }
+  } while (answer.x < 0 && attempt < attempts);
+  known = answer.x >= 0;
+  from_sky = vec3(0.0);
+  if (!known) {
+    return vec3(0.0);
   }
-  known = false;
-  return vec3(0.0);
+  vec4 sum = texelFetch(cache_sky_tx, answer - ivec2(vpl_frame.cache.xy), 0);
+  from_sky = sum.rgb / max(sum.w, 1.0) * texelFetch(specular_tx, answer, 0).rgb; /* the cache's reflectance */
+  return index_radiance(position_area_tx, flux_tx, answer);
 }
 
 /* Texel of the emitter's point that answers for what a ray along `direction` hit at `hit`, or -1: the hit must lie on its
@@ -196,35 +206,38 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
   return flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
 }
 
-/* Radiance that the cache holds for a receiver's ray. Where no point answers for its hit, another ray's stands in: what is
- * not known is taken for the mean of what the receiver sees, not for black, and still nothing passes a wall. */
-vec3 candidates_bounced(vec3 origin, vec3 N, vec3 geometric, vec2 noise, vec3 hit, vec3 direction, float far,
-                        vec3 cell_noise, out vec3 from_sky)
+/* Radiance that the cache holds for what a receiver's ray hits, and how far that is, negative if it hits nothing. Where no
+ * point answers for the hit, another ray's stands in: what is not known is taken for the mean of what the receiver sees,
+ * not for black, and still nothing passes a wall. */
+vec3 candidates_bounced(vec3 origin, vec3 N, vec3 geometric, vec2 noise, vec3 cell_noise, out float far,
+                        out vec3 from_sky)
 {
-  bool known;
-  vec3 carried = candidates_carried(hit, direction, far, cell_noise, known, from_sky);
-  for (int i = 1; i <= CANDIDATES_AGAIN && !known && vpl_frame.cache.z > 0.0; i++) {
-    vec3 other = candidates_cosine_direction(N, fract(noise + float(i) * CANDIDATES_TURN));
-    float other_far = dot(other, geometric) > 0.0 ? voxel_trace(origin, other, 1e30) : -1.0;
-    if (other_far >= 0.0) {
-      vec3 other_hit = origin + (other_far + 0.5 * voxel_grid.edge) * other;
-      carried = candidates_carried(other_hit, other, other_far, cell_noise, known, from_sky);
+  vec3 carried = vec3(0.0);
+  from_sky = vec3(0.0);
+  bool known = false;
+  int again = 0;
+  do {
+    vec3 direction = candidates_cosine_direction(N, fract(noise + float(again) * CANDIDATES_TURN));
+    float reach = dot(direction, geometric) > 0.0 ? voxel_trace(origin, direction, 1e30) : -1.0;
+    if (reach >= 0.0) {
+      vec3 hit = origin + (reach + 0.5 * voxel_grid.edge) * direction;
+      carried = candidates_carried(hit, direction, reach, cell_noise, known, from_sky);
     }
-  }
+    far = again == 0 ? reach : far;
+    again++;
+  } while (far >= 0.0 && !known && again <= CANDIDATES_AGAIN && vpl_frame.cache.z > 0.0);
   return carried;
 }
 
-/* Fill a reservoir for the surface at P from lights of `kinds`, bits of SourceKind. `visible`: the chosen one is known to
- * be seen from it. `carried` and `emitted` are one ray's estimates of the irradiance / pi from the cache, and from emitters;
+/* Fill a reservoir for the surface at P, whose rays begin at `origin` (voxel_start_seen), from lights of `kinds`, bits of
+ * SourceKind. `visible`: the chosen one is known to be seen from it. `carried` and `emitted` are one ray's estimates of the irradiance / pi from the cache, and from emitters;
  * `from_sky` the part of `carried` that came from the sky. Receivers and their rounds, of the same sample, differ in
  * `pixel` or in `round`. */
-Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec2 pixel, int round, int kinds,
+Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 origin, ivec2 pixel, int round, int kinds,
                             out bool visible, out vec3 carried, out vec3 from_sky, out vec3 emitted)
 {
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
   visible = false;
-  carried = vec3(0.0);
-  from_sky = vec3(0.0);
   emitted = vec3(0.0);
   int count = vpl_frame.candidates;
   int seed = vpl_frame.seed + 4 * round;
@@ -232,17 +245,16 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
   float u = start.y;
   float stratum = float(vpl_frame.pool) / float(count);
   float candidates = float(count);
-  for (int i = 0; i < count; i++) {
+  int i = 0;
+  do {
     int entry = min(int((float(i) + start.x) * stratum), vpl_frame.pool - 1);
     ivec2 at = ivec2(entry % VPL_POOL_ROW, entry / VPL_POOL_ROW);
     vec4 facing = texelFetch(pool_normal_tx, at, 0);
     int id = floatBitsToInt(facing.w);
-    if ((kinds >> vpl_id_kind(id) & 1) == 0) {
-      continue;
-    }
+    bool wanted = (kinds >> vpl_id_kind(id) & 1) != 0;
     vec4 flux = texelFetch(pool_flux_tx, at, 0);
     vec4 place = texelFetch(pool_position_tx, at, 0);
-    float form = vpl_form(place.xyz, place.w, octahedron_decode(facing.xy), P, N);
+    float form = wanted ? vpl_form(place.xyz, place.w, octahedron_decode(facing.xy), P, N) : 0.0;
     vec3 toward = flux.rgb;
 #ifdef GLOSSY
     vec4 specular = texelFetch(pool_specular_tx, at, 0);
@@ -253,54 +265,52 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 seen_from, ivec
     float target = vpl_strength(toward) * form;
     float by_ray = facing.z * place.w * form * (1.0 / MATH_PI);
     reservoir_offer(r, id, target / max(candidates * flux.w + by_ray, 1e-30), target, u);
-  }
+    i++;
+  } while (i < count);
   vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
+  vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
+  vec3 cell_noise = vec3(sampling_hash(pixel, seed + 3), choice.y);
   vec3 direction = candidates_cosine_direction(N, noise);
-  if (dot(direction, geometric) > 0.0) {
-    vec3 origin = voxel_start_seen(P, geometric, seen_from);
-    float far = voxel_trace(origin, direction, 1e30);
-    float share = 1.0;
-    int seen_tile = 0;
-    Vpl seen = VPL_NONE;
-    if (far >= 0.0) {
-      vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 2));
-      vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
-      emitted = candidates_emitted(P, N, hit, direction);
-      vec3 cell_noise = vec3(sampling_hash(pixel, seed + 3), choice.y);
-      carried = candidates_bounced(origin, N, geometric, noise, hit, direction, far, cell_noise, from_sky);
-      int tile = (kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
-      if (tile >= 0) {
-        seen = candidates_seen(hit, direction, tile, seen_tile);
-      }
-    } else if (vpl_frame.sky.z > 0.0 && (kinds >> SOURCE_SKY & 1) != 0) {
-      seen = candidates_sky(direction);
-      seen_tile = vpl_frame.sky_tile;
+  float far;
+  carried = candidates_bounced(origin, N, geometric, noise, cell_noise, far, from_sky);
+  float share = 1.0;
+  int seen_tile = 0;
+  Vpl seen = VPL_NONE;
+  if (far >= 0.0) {
+    vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
+    emitted = candidates_emitted(P, N, hit, direction);
+    int tile = (kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
+    if (tile >= 0) {
+      seen = candidates_seen(hit, direction, tile, seen_tile);
     }
-    float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
-    vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
-    float target = vpl_strength(toward) * form;
-    if (seen.id != 0 && target > 0.0) {
-      float strength = seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb));
-      float by_pool = candidates * candidates_probability(seen_tile, strength);
-      float by_ray = share * seen.area * form * (1.0 / MATH_PI);
-      int before = r.id;
-      float sum = r.sum;
-      reservoir_offer(r, seen.id, target / max(by_pool + by_ray, 1e-30), target, u);
-      visible = r.id == seen.id && (before != seen.id || sum != r.sum);
-    }
+  } else if (dot(direction, geometric) > 0.0 && vpl_frame.sky.z > 0.0 && (kinds >> SOURCE_SKY & 1) != 0) {
+    seen = candidates_sky(direction);
+    seen_tile = vpl_frame.sky_tile;
+  }
+  float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
+  vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
+  float target = vpl_strength(toward) * form;
+  if (seen.id != 0 && target > 0.0) {
+    float strength = seen.counts * (vpl_strength(seen.flux) + vpl_strength(seen.specular.rgb));
+    float by_pool = candidates * candidates_probability(seen_tile, strength);
+    float by_ray = share * seen.area * form * (1.0 / MATH_PI);
+    int before = r.id;
+    float sum = r.sum;
+    reservoir_offer(r, seen.id, target / max(by_pool + by_ray, 1e-30), target, u);
+    visible = r.id == seen.id && (before != seen.id || sum != r.sum);
   }
   r.seen = 1.0;
   return r;
 }
 
 /* The chosen light's irradiance / pi, if it is seen. */
-vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 geometric, vec3 seen_from)
+vec3 candidates_light(Reservoir r, bool visible, vec3 P, vec3 N, vec3 origin)
 {
   if (r.id == 0) {
     return vec3(0.0);
   }
   Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
-  if (!visible && !reach_sees(P, geometric, seen_from, vpl)) {
+  if (!visible && !reach_sees(P, origin, vpl)) {
     return vec3(0.0);
   }
   return vpl_light(vpl, P, N) * (r.sum / r.target);

@@ -19,16 +19,16 @@ void main()
   vec4 packed_normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(packed_normals.xy);
   vec3 geometric = octahedron_decode(packed_normals.zw);
-  vec3 seen_from = math_toward(P, vpl_frame.eye);
+  vec3 origin = voxel_start_seen(P, geometric, math_toward(P, vpl_frame.eye));
   bool visible;
   vec3 carried;
   vec3 from_sky;
   vec3 emitted;
   int has = int(position.w);
   int kinds = (has & HAS_SKY) != 0 ? vpl_frame.kinds & ~(1 << SOURCE_SKY) : vpl_frame.kinds;
-  Reservoir r = candidates_choose(P, N, geometric, seen_from, pixel, 0, kinds, visible, carried, from_sky, emitted);
+  Reservoir r = candidates_choose(P, N, geometric, origin, pixel, 0, kinds, visible, carried, from_sky, emitted);
   carried -= (has & HAS_SKY_BOUNCES) != 0 ? from_sky : vec3(0.0);
-  vec3 light = candidates_light(r, visible, P, N, geometric, seen_from);
+  vec3 light = candidates_light(r, visible, P, N, origin);
   out_surface = surface_pack(P, N);
 #ifdef BOUND_VIEW
   /* What 1 / d^2 would give more than 1 / (d^2 + A / pi). */

@@ -15,10 +15,9 @@ float reach_depth(vec3 P)
   return vpl_frame.eye.w > 0.5 ? distance(P, vpl_frame.eye.xyz) : -dot(P, vpl_frame.eye.xyz);
 }
 
-vec3 reach_place(vec3 P)
+vec2 reach_place(vec4 clip)
 {
-  vec4 clip = vpl_frame.clip_from_world * vec4(P, 1.0);
-  return vec3(0.5 + 0.5 * clip.xy / clip.w, clip.w);
+  return 0.5 + 0.5 * clip.xy / clip.w;
 }
 
 /* Whether no surface that the camera sees lies just before the first part of the way to Q. Where a picture's pixels are
@@ -29,33 +28,35 @@ bool reach_contact(vec3 P, vec3 Q)
   float reach = distance(P, Q);
   float span = min(REACH_CONTACT * voxel_grid.edge, reach - REACH_THICKNESS * voxel_grid.edge);
   vec3 direction = (Q - P) / reach;
-  vec3 first = reach_place(P);
-  vec3 last = reach_place(P + span * direction);
-  if (span <= 0.0 || last.z <= 0.0 || distance(first.xy * size, last.xy * size) < float(REACH_STEPS)) {
+  vec4 first = vpl_frame.clip_from_world * vec4(P, 1.0);
+  vec4 last = first + vpl_frame.clip_from_world * vec4(span * direction, 0.0);
+  if (span <= 0.0 || last.w <= 0.0 ||
+      distance(reach_place(first) * size, reach_place(last) * size) < float(REACH_STEPS)) {
     return true;
   }
-  for (int i = 0; i < REACH_STEPS; i++) {
-    vec3 p = P + direction * (span * (float(i) + 0.5) / float(REACH_STEPS));
-    vec2 place = reach_place(p).xy;
-    if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, vec2(1.0)))) {
-      return true;
-    }
-    vec4 seen = texelFetch(position_tx, ivec2(place * size), 0);
+  int i = 0;
+  bool free = true;
+  bool inside = true;
+  do {
+    float part = (float(i) + 0.5) / float(REACH_STEPS);
+    vec3 p = P + direction * (span * part);
+    vec2 place = reach_place(mix(first, last, part));
+    inside = all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, vec2(1.0)));
+    vec4 seen = texelFetch(position_tx, clamp(ivec2(place * size), ivec2(0), ivec2(size) - 1), 0);
     float before = reach_depth(p) - reach_depth(seen.xyz);
-    if (seen.w != 0.0 && before > REACH_BEFORE * voxel_grid.edge && before < REACH_THICKNESS * voxel_grid.edge) {
-      return false;
-    }
-  }
-  return true;
+    free = !inside || seen.w == 0.0 || before <= REACH_BEFORE * voxel_grid.edge ||
+           before >= REACH_THICKNESS * voxel_grid.edge;
+    i++;
+  } while (i < REACH_STEPS && free && inside);
+  return free;
 }
 
-/* Whether a surface at P, seen from the unit direction `seen_from`, sees the light. */
-bool reach_sees(vec3 P, vec3 geometric, vec3 seen_from, Vpl vpl)
+/* Whether a surface at P, whose rays begin at `start` (voxel_start_seen), sees the light. */
+bool reach_sees(vec3 P, vec3 start, Vpl vpl)
 {
   if (vpl_frame.occluded == 0 || distance(P, vpl.position) < VOXEL_NEAREST * voxel_grid.edge) {
     return true;
   }
-  vec3 start = voxel_start_seen(P, geometric, seen_from);
   return voxel_clear(start, voxel_start(vpl.position, vpl.normal)) &&
          (vpl_frame.contact == 0 || reach_contact(P, vpl.position));
 }

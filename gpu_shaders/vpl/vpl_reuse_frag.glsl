@@ -6,8 +6,7 @@
 #include "vpl/vpl_history_lib.glsl"
 #include "vpl/vpl_reach_lib.glsl"
 
-/* Reservoirs of neighbours that are asked, and from how far, in texels. */
-const int REUSE_NEIGHBOURS = 2;
+/* How far away neighbours' reservoirs are asked, in texels. */
 const float REUSE_RADIUS = 6.0;
 /* Neighbours less alike than this give nothing. */
 const float REUSE_ALIKE = 0.5;
@@ -21,19 +20,38 @@ struct Source {
   float seen;
 };
 
-void reuse_offer(inout Reservoir r, inout Source sources[REUSE_NEIGHBOURS + 2], int number, Gatherer surface,
-                 vec4 stored, float most, Gatherer at, inout float u)
+/* Offer what a surface stored; `seen`: the candidates that it stands for. */
+Source reuse_offer(inout Reservoir r, Gatherer surface, vec4 stored, float seen, Gatherer at, inout float u)
 {
-  float seen = min(stored.z, most);
-  sources[number] = Source(surface, seen);
   r.seen += seen;
   int id = floatBitsToInt(stored.x);
-  if (id == 0 || stored.y <= 0.0) {
-    return;
+  if (id != 0 && stored.y > 0.0) {
+    Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
+    float target = vpl_strength(vpl_light(vpl, at.P, at.N));
+    reservoir_offer(r, id, target * stored.y * seen, target, u);
   }
-  Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, id);
-  float target = vpl_strength(vpl_light(vpl, at.P, at.N));
-  reservoir_offer(r, id, target * stored.y * seen, target, u);
+  return Source(surface, seen);
+}
+
+/* Offer what the surface, number 0, or a neighbour around `place` had in the picture before, where it is alike. */
+Source reuse_before(inout Reservoir r, int number, vec2 place, vec2 noise, Gatherer at, inout float u)
+{
+  float angle = 2.0 * MATH_PI * fract(noise.y + float(number) * 0.618034);
+  float radius = number == 0 ? 0.0 : REUSE_RADIUS * sqrt(fract(noise.x + float(number) * 0.754878));
+  ivec2 from = ivec2(floor(place + 0.5 + radius * vec2(cos(angle), sin(angle))));
+  if (any(lessThan(from, ivec2(0))) || any(greaterThanEqual(from, textureSize(history_tx, 0)))) {
+    return Source(at, 0.0);
+  }
+  Gatherer old = surface_unpack(texelFetch(old_surface_tx, from, 0));
+  vec4 stored = texelFetch(old_reservoir_tx, from, 0);
+  bool alike = old.exists && surface_alike(at, old) > REUSE_ALIKE;
+  return reuse_offer(r, old, stored, alike ? min(stored.z, pc_most_reuse) : 0.0, at, u);
+}
+
+/* The candidates of a source, if it could have chosen the light. */
+float reuse_able(Source source, Vpl vpl)
+{
+  return vpl_form(vpl.position, vpl.area, vpl.normal, source.surface.P, source.surface.N) > 0.0 ? source.seen : 0.0;
 }
 
 void main()
@@ -57,24 +75,15 @@ void main()
   vec4 own = texelFetch(reservoir_tx, texel, 0);
   vec2 noise = sampling_r2(vpl_frame.number, sampling_hash(texel, vpl_frame.seed + REUSE_SEED));
   float u = noise.x;
-  Source sources[REUSE_NEIGHBOURS + 2];
   Reservoir r = Reservoir(0, 0.0, 0.0, 0.0);
-  reuse_offer(r, sources, 0, at, own, 1.0, at, u);
-  int count = 1;
+  Source now = reuse_offer(r, at, own, 1.0, at, u);
+  Source here = Source(at, 0.0);
+  Source one = here;
+  Source other = here;
   if (before && pc_most_reuse > 0.0) {
-    for (int i = 0; i <= REUSE_NEIGHBOURS; i++) {
-      float angle = 2.0 * MATH_PI * fract(noise.y + float(i) * 0.618034);
-      float radius = i == 0 ? 0.0 : REUSE_RADIUS * sqrt(fract(noise.x + float(i) * 0.754878));
-      ivec2 from = ivec2(floor(place + 0.5 + radius * vec2(cos(angle), sin(angle))));
-      if (any(lessThan(from, ivec2(0))) || any(greaterThanEqual(from, textureSize(history_tx, 0)))) {
-        continue;
-      }
-      Gatherer old = surface_unpack(texelFetch(old_surface_tx, from, 0));
-      if (old.exists && surface_alike(at, old) > REUSE_ALIKE) {
-        reuse_offer(r, sources, count, old, texelFetch(old_reservoir_tx, from, 0), pc_most_reuse, at, u);
-        count++;
-      }
-    }
+    here = reuse_before(r, 0, place, noise, at, u);
+    one = reuse_before(r, 1, place, noise, at, u);
+    other = reuse_before(r, 2, place, noise, at, u);
   }
   vec3 light = texelFetch(rest_tx, texel, 0).rgb;
   vec3 direct = vec3(0.0);
@@ -84,14 +93,10 @@ void main()
   float weight = 0.0;
   if (r.id != 0) {
     Vpl vpl = vpl_of_texel(position_area_tx, normal_kind_tx, flux_tx, specular_tx, r.id);
-    float able = 0.0;
-    for (int i = 0; i < count; i++) {
-      Gatherer s = sources[i].surface;
-      able += vpl_form(vpl.position, vpl.area, vpl.normal, s.P, s.N) > 0.0 ? sources[i].seen : 0.0;
-    }
+    float able = reuse_able(now, vpl) + reuse_able(here, vpl) + reuse_able(one, vpl) + reuse_able(other, vpl);
     weight = r.sum / max(able * r.target, 1e-30);
     bool own_choice = r.id == floatBitsToInt(own.x);
-    if (!own_choice && !reach_sees(at.P, at.N, math_toward(at.P, vpl_frame.eye), vpl)) {
+    if (!own_choice && !reach_sees(at.P, voxel_start_seen(at.P, at.N, math_toward(at.P, vpl_frame.eye)), vpl)) {
       weight = 0.0;
     }
     vec3 chosen = vpl_light(vpl, at.P, at.N) * weight;

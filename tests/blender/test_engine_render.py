@@ -17,9 +17,9 @@ __all__ = ["rebound_scene"]
 
 
 OLD_NAMES = ["Combined", "Depth", "Normal", "Position", "DiffDir", "DiffInd", "DiffCol"]
-OLD_NAMES += ["GlossDir", "GlossInd", "GlossCol", "Emit", "Env"]
+OLD_NAMES += ["GlossDir", "GlossInd", "GlossCol", "TransDir", "TransInd", "TransCol", "Emit", "Env"]
 NEW_NAMES = ["Combined", "Depth", "Normal", "Position", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color"]
-NEW_NAMES += ["Glossy Direct", "Glossy Indirect", "Glossy Color"]
+NEW_NAMES += [f"{kind} {way}" for kind in ("Glossy", "Transmission") for way in ("Direct", "Indirect", "Color")]
 NAMES = OLD_NAMES if bpy.app.version < (5, 0) else [*NEW_NAMES, "Emission", "Environment"]
 
 

@@ -4,8 +4,11 @@ import bpy
 import numpy as np
 import pytest
 
+from rebound.passes import PASSES
 from rebound.tests.support.blender_build import link, material, mesh
 from rebound.tests.support.engine_build import picture, render
+
+_LIT_PASSES = [(p.key, p.label, p.old_name) for p in PASSES if p.key.startswith(("diffuse", "transmission"))]
 
 
 @pytest.fixture
@@ -56,3 +59,29 @@ def test_a_volume_without_a_surface_hides_nothing(sheet, tmp_path):
     scene.camera.location.z = 5
     found = picture(render(scene, tmp_path / "fog.exr"))
     assert found[..., :3].mean() == pytest.approx(0.8, abs=0.02)
+
+
+@pytest.mark.parametrize("kind", ["Transparent", "Refraction"])
+def test_what_is_seen_through_glass_is_the_glasss_own(sheet, kind, tmp_path):
+    tree, scene = sheet.node_tree, bpy.context.scene
+    tree.nodes.clear()
+    made, output = tree.nodes.new(f"ShaderNodeBsdf{kind}"), tree.nodes.new("ShaderNodeOutputMaterial")
+    made.inputs["Color"].default_value = (0.5, 0.5, 0.25, 1.0)
+    tree.links.new(made.outputs[0], output.inputs["Surface"])
+    scene.camera.location.z = 5
+    names = {key: label if bpy.app.version >= (5, 0) else old for key, label, old in _LIT_PASSES}
+    for key in names:
+        setattr(scene.view_layers[0], f"use_pass_{key}", True)
+    found = render(scene, tmp_path / "glass.exr")
+
+    def mean(key):
+        return np.array([found[f"ViewLayer.{names[key]}.{c}"].mean() for c in "RGB"])
+
+    tint = np.array([0.5, 0.5, 0.25])
+    glass = kind == "Refraction"
+    np.testing.assert_allclose(mean("diffuse_color"), 0.0 if glass else 0.8 * tint, atol=0.01)
+    np.testing.assert_allclose(mean("transmission_color"), tint if glass else 0.0, atol=0.01)
+    light = mean("transmission_color") * (mean("transmission_direct") + mean("transmission_indirect"))
+    seen = picture(found)[..., :3].mean(axis=(0, 1))
+    assert seen.min() > 0.05
+    np.testing.assert_allclose(light + mean("diffuse_color") * mean("diffuse_direct"), seen, atol=0.01)

@@ -280,7 +280,7 @@ def test_point_beside_a_wall_sees_its_own_side_only(room):
     up = "vec3(0.0, 0.0, 1.0)"
     found = shown.ask(f"voxel_clear(voxel_start_seen(P, {up}, eye), end)", P=P, eye=eye, end=end)
     np.testing.assert_array_equal(found, (np.sign(end[:, :1]) == side)[:, 0])
-    assert shown.ask(f"voxel_occupied(voxel_start(P, {up}))", P=P).mean() > 0.3
+    assert shown.ask(f"voxel_occupied(voxel_place_at(P), voxel_start(P, {up}))", P=P).mean() > 0.3
 
 
 # --- work ------------------------------------------------------------------------------------------------------------
