@@ -7,19 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from .bake import lobes
 from .bake.light import Surroundings
 from .bake.live import Live, make_live
 from .bake.surfaces import frame_of, mesh_vertices
+from .bake.view_table import LOBES, weights
 from .device.interface import Device, Target
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
 from .gpu_shaders.prt import BakedObject, BakedObjects
-from .gpu_shaders.prt.shaders import LOBES_SIDE
+from .gpu_shaders.prt.shaders import LOBE_BANDS, LOBE_TEXELS, LOBES_SIDE
 from .scene.data import Instance, Scene, Visibility
 from .settings import Settings
 
-_BANDS = 6  # that the shader knows
 _SEEN = Visibility.CAMERA
 _NOT_LIT = Visibility.HOLDOUT | Visibility.NO_INDIRECT
 
@@ -36,6 +35,7 @@ class BakedLight:
         self._revision = -1  # of the environment that these are
         self._drawn: list[BakedObject] = []
         self._up_to_date: tuple = ()
+        self._lobe = ""  # of which the GPU has the table
         self._lit: list[Instance] = []
         self._shown: dict[Hashable, tuple] = {}  # by Instance.key: of which coefficient there is a picture
 
@@ -88,6 +88,7 @@ class BakedLight:
 
     def free(self) -> None:
         self._objects.free()
+        self._lobe = ""
         self._shown.clear()
         self._live.clear()
         self._answered.clear()
@@ -95,8 +96,9 @@ class BakedLight:
 
     def _object(self, scene: Scene, instance: Instance, settings: Mapping[str, Any]) -> BakedObject:
         live, frame = self._prepare(scene, instance), frame_of(instance.world_from_object)
-        if live.coefficients > 1 and not self._objects.has_lobes:
-            self._objects.set_lobes(lobe_table())
+        if live.coefficients > 1 and self._lobe != settings["lobe"]:
+            self._lobe = str(settings["lobe"])
+            self._objects.set_lobes(lobe_table(self._lobe))
         question = (instance.transfer, frame.tobytes(), *(settings[name] for name in ("bands", "window", "terms")))
         if self._answered.get(instance.key) != question:
             answer = live.answer(
@@ -136,13 +138,11 @@ def _signed(values: np.ndarray) -> np.ndarray:
     return np.stack([np.maximum(scaled, 0), 0 * scaled, np.maximum(-scaled, 0)], axis=-1)[:, None].astype(np.float32)
 
 
-def lobe_table() -> np.ndarray:
-    """(cosines, 2 roughnesses, 4): what prt_glossy_frag.glsl reads of a GGX lobe, two texels a roughness."""
-    table = np.zeros((LOBES_SIDE, LOBES_SIDE, 8))
+def lobe_table(lobe: str) -> np.ndarray:
+    """(views, LOBE_TEXELS roughnesses, 4): what prt_glossy_frag.glsl reads of a lobe of bake.view_table.LOBES."""
+    table = np.zeros((LOBES_SIDE, LOBES_SIDE, 4 * LOBE_TEXELS))
     steps = np.linspace(0.0, 1.0, LOBES_SIDE)
-    for row, cosine in enumerate(steps):
-        for column, roughness in enumerate(steps):
-            lobe, axis = lobes.ggx_seen(_BANDS, roughness, cosine)
-            table[row, column, 0] = axis
-            table[row, column, 1:_BANDS] = (lobes.band_scales(_BANDS) * lobe)[1:]
-    return table.reshape(LOBES_SIDE, 2 * LOBES_SIDE, 4)
+    for row, slant in enumerate(steps):
+        found = weights(LOBES[lobe], LOBE_BANDS, steps.tolist(), 1.0 - slant * slant)[:, :, 1:]
+        table[row, :, : found[0].size] = found.reshape(LOBES_SIDE, -1)
+    return table.reshape(LOBES_SIDE, LOBE_TEXELS * LOBES_SIDE, 4)

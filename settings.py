@@ -147,6 +147,19 @@ SETTINGS = (
         soft_maximum=2048,
     ),
     Setting(
+        "transfer_lobe",
+        "ENUM",
+        "Lobe",
+        "How glossy bakes are seen: by which lobe surfaces mirror what arrives",
+        "GGX",
+        items=(
+            Item(
+                "GGX", "GGX", "The lobe of the materials: longer and leaning to the normal where it is seen obliquely"
+            ),
+            Item("PHONG", "Phong", "The same round lobe from all sides, as wide as GGX: even highlights"),
+        ),
+    ),
+    Setting(
         "transfer_window",
         "FLOAT",
         "Window",

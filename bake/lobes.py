@@ -66,43 +66,6 @@ def ggx(bands: int, roughness: float) -> Array:
     return (weights / weights.sum()) @ evaluate(axis, bands)[:, orders * (orders + 1)]
 
 
-def ggx_seen(bands: int, roughness: float, cosine: float, points: int = 24) -> tuple[Array, float]:
-    """A GGX mirror's lobe seen from ``cosine`` to its normal: coefficients around its mean direction, integral 1, and
-    the cosine of that direction to the normal. It lies in the plane of normal and view, on the far side.
-
-    Integrated over visible normals (Dupuy, Benyoub 2023), with the height-correlated shadowing of the frame's own lobe.
-    """
-    alpha = max(roughness * roughness, 1e-3)
-    cosine = float(np.clip(cosine, 1e-3, 1.0))
-    view = np.array([np.sqrt(1.0 - cosine * cosine), 0.0, cosine])
-    stretched = view * [alpha, alpha, 1.0]
-    stretched /= np.linalg.norm(stretched)
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    u, azimuth = 0.5 * (nodes + 1.0), (np.arange(2 * points) + 0.5) * (np.pi / points)
-    z = (1.0 - u) * (1.0 + stretched[2]) - stretched[2]
-    radius = np.sqrt(np.clip(1.0 - z * z, 0.0, 1.0))
-    x, y = radius[:, None] * np.cos(azimuth), radius[:, None] * np.sin(azimuth)
-    cap = np.stack(np.broadcast_arrays(x, y, z[:, None]), axis=-1)
-    normals = (cap + stretched) * [alpha, alpha, 1.0]
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    out = (2.0 * (normals @ view)[..., None] * normals - view).reshape(-1, 3)
-    lost = _smith(cosine, alpha)
-    share = np.repeat(weights, 2 * points) * (1.0 + lost) / (1.0 + lost + _smith(np.maximum(out[:, 2], 1e-6), alpha))
-    share = np.where(out[:, 2] > 0.0, share, 0.0)
-    share /= share.sum()
-    mean = share @ out
-    axis = mean / np.linalg.norm(mean)
-    along = np.clip(out @ axis, -1.0, 1.0)
-    directions = np.stack([np.sqrt(1.0 - along * along), np.zeros_like(along), along], axis=-1)
-    orders = np.arange(bands)
-    return share @ evaluate(directions, bands)[:, orders * (orders + 1)], float(axis[2])
-
-
-def _smith(cosine, alpha: float):
-    """Smith's Lambda."""
-    return 0.5 * (np.sqrt(1.0 + alpha * alpha * (1.0 / np.square(cosine) - 1.0)) - 1.0)
-
-
 def window(coefficients: Array, factors: Array) -> Array:
     """Multiply each band by its factor."""
     return coefficients * factors[band_of(band_count(coefficients))]

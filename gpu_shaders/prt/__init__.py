@@ -6,7 +6,7 @@ P.-P. Sloan, J. Kautz, J. Snyder, "Precomputed Radiance Transfer", SIGGRAPH 2002
 1. The light of the vertices comes from ``bake.live``, by products of matrices, whenever the surroundings or their
    rotation change: irradiance / pi, or harmonics of the arriving radiance.
 2. The objects are drawn again where the G-buffer has them. A pixel mixes its vertices' light; harmonics are convolved
-   with the cosine and with the material's lobe there.
+   with the cosine there, and multiplied with the weights that the material's lobe has from this view.
 3. What was drawn is added to the direct light. The G-buffer's position is marked, so that no technique adds the sky.
 
 Limits: docs/prt.md. Between the vertices light is mixed, so it is as fine as the mesh.
@@ -82,12 +82,9 @@ class BakedObjects:
         self._lights[key] = (self.device.texture((row * texels, height), "RGBA32F", data), coefficients, texels)
 
     def set_lobes(self, table: np.ndarray) -> None:
-        """(cosines, 2 roughnesses, 4) of PRT_LOBES a side: see prt_lobe() in prt_glossy_frag.glsl."""
+        """(views, LOBE_TEXELS roughnesses, 4) of LOBES_SIDE a side: see prt_weights() in prt_glossy_frag.glsl."""
+        self.device.free(self._lobes)
         self._lobes = self.device.texture((table.shape[1], table.shape[0]), "RGBA32F", table.astype(np.float32))
-
-    @property
-    def has_lobes(self) -> bool:
-        return self._lobes is not None
 
     def object(
         self, mesh: Hashable, light: Hashable, world_from_object: np.ndarray, frame: np.ndarray, *, bounces: bool

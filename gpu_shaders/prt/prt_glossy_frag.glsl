@@ -1,5 +1,6 @@
 /* The radiance that arrives, as spherical harmonics between the vertices (Sloan, Kautz, Snyder 2002): convolved with the
- * cosine around the normal, and with the material's lobe around the direction that the lobe has on average. */
+ * cosine around the normal, and as a table over roughness and view says that the material is seen (Kautz, Sloan,
+ * Snyder 2002). */
 #include "lib/bxdf_lib.glsl"
 #include "lib/octahedron_lib.glsl"
 #include "lib/sh_lib.glsl"
@@ -7,28 +8,51 @@
 /* The cosine lobe over pi, a factor a band (Ramamoorthi & Hanrahan 2001). */
 const float PRT_COSINE[6] = float[6](1.0, 0.66666667, 0.25, 0.0, -0.041666667, 0.0);
 
-/* x: cosine of the lobe's mean direction to the normal, and factors of the bands 1 to 5. */
-void prt_lobe(float roughness, float cosine, out float axis, out float bands[6])
+/* The table of bake/view_table.py at a roughness and view: a weight for each direction and band from 1 on. */
+void prt_weights(float roughness, float cosine, out vec4 weights[PRT_TEXELS])
 {
-  vec2 place = clamp(vec2(roughness, cosine), 0.0, 1.0) * float(PRT_LOBES - 1);
+  vec2 place = clamp(vec2(roughness, sqrt(1.0 - cosine)), 0.0, 1.0) * float(PRT_LOBES - 1);
   ivec2 lower = min(ivec2(place), ivec2(PRT_LOBES - 2));
   vec2 part = place - vec2(lower);
-  vec4 first = vec4(0.0);
-  vec4 second = vec4(0.0);
+  for (int i = 0; i < PRT_TEXELS; i++) {
+    weights[i] = vec4(0.0);
+  }
   for (int i = 0; i < 4; i++) {
     ivec2 corner = ivec2(i & 1, i >> 1);
     vec2 near = mix(1.0 - part, part, vec2(corner));
-    ivec2 texel = (lower + corner) * ivec2(2, 1);
-    first += near.x * near.y * texelFetch(lobe_tx, texel, 0);
-    second += near.x * near.y * texelFetch(lobe_tx, texel + ivec2(1, 0), 0);
+    ivec2 texel = (lower + corner) * ivec2(PRT_TEXELS, 1);
+    for (int j = 0; j < PRT_TEXELS; j++) {
+      weights[j] += near.x * near.y * texelFetch(lobe_tx, texel + ivec2(j, 0), 0);
+    }
   }
-  axis = first.x;
-  bands[0] = 1.0;
-  bands[1] = first.y;
-  bands[2] = first.z;
-  bands[3] = first.w;
-  bands[4] = second.x;
-  bands[5] = second.y;
+}
+
+/* What the harmonics of the arriving radiance are multiplied with to be what is seen, along the bake's axes. */
+void prt_seen(vec3 N, vec3 V, float roughness, mat3 local, out float seen[SH_MOST])
+{
+  float cosine = clamp(dot(N, V), 0.0, 1.0);
+  vec3 across = cosine * N - V; /* away from the view, along the surface */
+  float size = length(across);
+  across = size > 1e-6 ? across / size : vec3(0.0);
+  vec4 weights[PRT_TEXELS];
+  prt_weights(roughness, cosine, weights);
+  for (int i = 0; i < SH_MOST; i++) {
+    seen[i] = 0.0;
+  }
+  float at[SH_MOST];
+  for (int k = 0; k < PRT_BANDS; k++) {
+    float angle = (float(k) + 0.5) * (MATH_PI / float(PRT_BANDS));
+    sh_evaluate(local * (sin(angle) * across + cos(angle) * N), at);
+    int i = 1;
+    for (int order = 1; order < PRT_BANDS; order++) {
+      int number = k * (PRT_BANDS - 1) + order - 1;
+      float weight = weights[number / 4][number % 4];
+      for (; i < (order + 1) * (order + 1); i++) {
+        seen[i] += weight * at[i];
+      }
+    }
+  }
+  seen[0] = at[0];
 }
 
 vec4 prt_mixed(int texel)
@@ -51,18 +75,11 @@ void main()
   vec4 specular = texelFetch(specular_tx, pixel, 0);
   float cosine = clamp(dot(N, V), 0.0, 1.0);
 
-  float axis;
-  float lobe[6];
-  prt_lobe(specular.a, cosine, axis, lobe);
-  vec3 across = cosine * N - V; /* away from the view, along the surface */
-  float size = length(across);
-  vec3 mirrored = size > 1e-6 ? axis * N + sqrt(max(1.0 - axis * axis, 0.0)) / size * across : N;
-
   mat3 local = mat3(prt_draw.local_from_world);
   float at_normal[SH_MOST];
-  float at_mirrored[SH_MOST];
+  float seen[SH_MOST];
   sh_evaluate(local * N, at_normal);
-  sh_evaluate(local * mirrored, at_mirrored);
+  prt_seen(N, V, specular.a, local, seen);
 
   /* Three numbers a coefficient, one after another in texels of four. */
   vec3 irradiance = vec3(0.0);
@@ -82,7 +99,7 @@ void main()
     }
     order += i == (order + 1) * (order + 1) ? 1 : 0;
     irradiance += value * (at_normal[i] * PRT_COSINE[order]);
-    radiance += value * (at_mirrored[i] * lobe[order]);
+    radiance += value * seen[i];
   }
   out_diffuse = vec4(max(irradiance, vec3(0.0)), 1.0);
   vec3 reflects = specular.rgb == vec3(0.0) ? vec3(0.0) : bxdf_albedo(specular.rgb, specular.a, cosine);

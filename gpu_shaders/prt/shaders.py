@@ -3,8 +3,11 @@
 from ...device.shader import Shader
 from ...device.structs import Struct
 
-# A cell of the table of lobes: roughness along x, cosine of the view along y, both 0..1; two texels each.
+# A cell of the table of lobes: roughness along x, root of 1 - cosine of the view along y, both 0..1. In its texels are
+# the weights of each direction in the plane of the view, one for each band but the first, whose weight is 1 in all.
 LOBES_SIDE = 32
+LOBE_BANDS = 6
+LOBE_TEXELS = -(-LOBE_BANDS * (LOBE_BANDS - 1) // 4)
 
 PRT_DRAW = Struct(
     "PrtDraw",
@@ -16,6 +19,13 @@ PRT_DRAW = Struct(
     row="int",  # vertices in a row of the texture
     texels="int",  # of a vertex
     coefficients="int",  # of the arriving radiance
+)
+
+_GLOSSY = (
+    ("GLOSSY", "1"),
+    ("PRT_LOBES", str(LOBES_SIDE)),
+    ("PRT_BANDS", str(LOBE_BANDS)),
+    ("PRT_TEXELS", str(LOBE_TEXELS)),
 )
 
 
@@ -34,7 +44,7 @@ def _draw(glossy: bool) -> Shader:
             **({"normal_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D", "lobe_tx": "FLOAT_2D"} if glossy else {}),
         },
         uniforms={"prt_draw": PRT_DRAW},
-        defines=(("PRT_LOBES", str(LOBES_SIDE)), *((("GLOSSY", "1"),) if glossy else ())),
+        defines=_GLOSSY if glossy else (),
     )
 
 

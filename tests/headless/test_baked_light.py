@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from rebound.bake import sh
+from rebound.bake.glossy import open_matrices
 from rebound.bake.job import BakeSettings, Kind
+from rebound.bake.sphere import quadrature
 from rebound.scene.data import Material, Visibility, World
 from rebound.tests.support.bake_scenes import grid
 from rebound.tests.support.baked_scenes import baked
+from rebound.tests.support.brdf_reference import ggx_values, phong_values
 from rebound.tests.support.glsl_functions import evaluate
 from rebound.tests.support.render_scenes import EVERYTHING, Studio, light, ortho, perspective, place, scene, sphere
 
@@ -109,6 +112,22 @@ def test_mirror_of_a_white_sky_is_white(studio):
     # Beside the rim the lobe is cut by the horizon, which six bands blur: to 0.9.
     np.testing.assert_allclose(found["glossy_direct"][middle], 1.0, atol=0.06)
     assert found["glossy_direct"][middle].mean() == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize(("lobe", "values"), [("GGX", ggx_values), ("PHONG", phong_values)])
+@pytest.mark.parametrize("roughness", [0.35, 0.6])
+def test_mirrored_light_is_the_lobe_summed_over_what_arrives(studio, lobe, values, roughness):
+    """A metal ball under a white sky, pixel by pixel: six bands of the open half space, through the lobe."""
+    metal = Material("Metal", (1.0, 1.0, 1.0), metallic=1.0, roughness=roughness)
+    alone = scene([sphere("ball", (0, 0, 0), 0.5, rings=48)], materials=[metal], world=World((1.0, 1.0, 1.0)))
+    shown = baked(alone, replace(QUICK, kind=Kind.GLOSSY, bands=6, result_bands=6, error=0.001, bounces=0))
+    found = studio.render(shown, ortho(32, 32, 1.2), 1, ("glossy_direct",), method="NONE", transfer_lobe=lobe)
+    towards, areas = quadrature(200)
+    arrives = sh.evaluate(towards, 6) @ open_matrices(np.array([[0.0, 0.0, 1.0]]), 6, 6)[0][:, 0] * np.sqrt(4 * np.pi)
+    for pixel in range(17, 28):
+        cosine = np.sqrt(1.0 - (((pixel + 0.5) / 32 * 1.2 - 0.6) / 0.5) ** 2 - (0.5 / 32 * 1.2 / 0.5) ** 2)
+        shares = values(towards, roughness, cosine) * areas
+        assert found["glossy_direct"][16, pixel, 0] == pytest.approx(shares @ arrives / shares.sum(), abs=0.01), pixel
 
 
 def test_objects_that_take_no_indirect_light_take_no_baked_one(studio):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rebound.bake import haar, lobes, sh
+from rebound.bake import haar, sh
 from rebound.bake.file import Bake
 from rebound.bake.job import BakeSettings, Kind, bake_objects, glossy_matrices, wavelet_rows
 from rebound.bake.light import Surroundings
 from rebound.bake.live import make_live
-from rebound.bake.sphere import cube_directions, cube_solid_angles, quadrature, texel_of
+from rebound.bake.sphere import cube_directions, cube_solid_angles, texel_of
 from rebound.bake.surfaces import frame_of
 from rebound.bake.transfer import finish
 from rebound.gpu_shaders.frame.environment_map import texel_directions, texel_omegas
@@ -132,42 +132,6 @@ def test_texel_of_a_direction_is_the_one_that_looks_there():
 
 def test_frame_of_the_ball_is_its_turn():
     np.testing.assert_allclose(frame_of(scene().instances[1].world_from_object), TURN, atol=1e-12)
-
-
-# --- the lobe that is seen -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("roughness", "cosine"), [(0.4, 1.0), (0.6, 0.7), (0.8, 0.3), (1.0, 0.9)])
-def test_lobe_seen_is_the_brdf_times_the_cosine(roughness, cosine):
-    """Its mean direction and its harmonics around that, summed over all directions."""
-    towards, weights = quadrature(300)
-    alpha, view = roughness**2, np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
-    half = towards + view
-    half /= np.linalg.norm(half, axis=1, keepdims=True)
-    normals = alpha**2 / (np.pi * (half[:, 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
-    z = np.maximum(towards[:, 2], 1e-6)
-    smith = [0.5 * (np.sqrt(1 + alpha**2 * (1 / c**2 - 1)) - 1) for c in (cosine, z)]
-    values = np.where(towards[:, 2] > 0, normals / (4 * cosine * (1 + sum(smith))), 0.0) * weights
-    mean = (values / values.sum()) @ towards
-    seen, axis = lobes.ggx_seen(6, roughness, cosine)
-    assert axis == pytest.approx(mean[2] / np.linalg.norm(mean), abs=2e-3)
-    around = sh.evaluate(towards, 6).T @ values / values.sum()
-    turned = lobes.turn(seen, mean / np.linalg.norm(mean))
-    # The lobe is not round: of what is, all is there.
-    for order in range(6):
-        band = slice(order**2, (order + 1) ** 2)
-        assert around[band] @ turned[band] == pytest.approx(turned[band] @ turned[band], abs=2e-3)
-
-
-def test_smooth_lobe_is_the_mirror():
-    seen, axis = lobes.ggx_seen(6, 0.05, 0.5)
-    np.testing.assert_allclose(seen * lobes.band_scales(6), 1.0, atol=0.01)
-    assert axis == pytest.approx(0.5, abs=1e-3)
-
-
-def test_rough_lobe_leans_from_the_mirrored_direction_to_the_normal():
-    axes = [lobes.ggx_seen(6, roughness, 0.3)[1] for roughness in (0.1, 0.4, 0.7, 1.0)]
-    assert all(a < b for a, b in zip(axes, axes[1:], strict=False)) and axes[-1] > 0.45
 
 
 @pytest.mark.parametrize("kind", list(Kind))
