@@ -1,4 +1,4 @@
-"""Lobes around an axis (zonal harmonics): cosine, Phong, GGX; convolution with them; windows against ringing.
+"""Lobes around an axis (zonal harmonics): cosine, Phong; convolution with them; windows against ringing.
 
 A lobe is its n coefficients z_l of the functions with m = 0, its axis being +Z. Convolving a function with it
 multiplies band l by sqrt(4 pi / (2 l + 1)) z_l (Funk and Hecke).
@@ -46,24 +46,6 @@ def phong(bands: int, exponent: float) -> Array:
 def cosine(bands: int) -> Array:
     """max(0, z): the lobe that turns radiance into irradiance (Ramamoorthi and Hanrahan 2001)."""
     return np.pi * phong(bands, 1.0)
-
-
-def ggx(bands: int, roughness: float) -> Array:
-    """The lobe of a GGX mirror seen along its normal, cosine included, scaled to integrate to 1.
-
-    ``roughness`` is the square root of alpha. Where the view is oblique the true lobe is longer and leans outwards; one
-    lobe for all views is what a rotation-invariant kernel can do. Half vectors are integrated by their cumulative
-    distribution, u in 0..1, cut off where the mirrored direction dips below the surface.
-    """
-    square = max(roughness, 1e-3) ** 4
-    nodes, weights = np.polynomial.legendre.leggauss(48)
-    u = (nodes + 1.0) * (0.5 / (1.0 + square))
-    half = (1.0 - u) / (1.0 + (square - 1.0) * u)  # squared cosine of the half vector
-    z = np.clip(2.0 * half - 1.0, -1.0, 1.0)
-    weights = weights * z
-    axis = np.stack([np.sqrt(1.0 - z * z), np.zeros_like(z), z], axis=-1)
-    orders = np.arange(bands)
-    return (weights / weights.sum()) @ evaluate(axis, bands)[:, orders * (orders + 1)]
 
 
 def window(coefficients: Array, factors: Array) -> Array:

@@ -165,22 +165,6 @@ def test_phong_lobe_is_the_integral_of_a_power(exponent):
     assert found[0] == pytest.approx(np.sqrt(0.25 / np.pi))
 
 
-@pytest.mark.parametrize("roughness", [0.3, 0.5, 1.0])
-def test_ggx_lobe_is_the_integral_of_its_distribution(roughness):
-    square = roughness**4
-
-    def lobe(z):
-        half = (1 + z) / 2  # squared cosine of the half vector
-        return z / (half * (square - 1) + 1) ** 2
-
-    numeric = numeric_lobe(lobe, 11)
-    assert np.abs(lobes.ggx(11, roughness) - numeric / numeric[0] * np.sqrt(0.25 / np.pi)).max() < 1e-6
-
-
-def test_smooth_ggx_lobe_is_a_point():
-    assert np.allclose(lobes.ggx(11, 0.0) * lobes.band_scales(11), 1.0, atol=1e-3)
-
-
 @given(seeds, few_bands)
 @settings(max_examples=20, deadline=None)
 def test_convolution_is_the_integral_over_a_turned_lobe(seed, bands):
