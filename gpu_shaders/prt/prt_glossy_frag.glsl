@@ -44,7 +44,7 @@ void prt_seen(vec3 N, vec3 V, float roughness, mat3 local, out float seen[SH_MOS
     float angle = (float(k) + 0.5) * (MATH_PI / float(PRT_BANDS));
     sh_evaluate(local * (sin(angle) * across + cos(angle) * N), at);
     int i = 1;
-    for (int order = 1; order < PRT_BANDS; order++) {
+    for (int order = 1; order * order < prt_draw.coefficients; order++) {
       int number = k * (PRT_BANDS - 1) + order - 1;
       float weight = weights[number / 4][number % 4];
       for (; i < (order + 1) * (order + 1); i++) {
@@ -79,7 +79,10 @@ void main()
   float at_normal[SH_MOST];
   float seen[SH_MOST];
   sh_evaluate(local * N, at_normal);
-  prt_seen(N, V, specular.a, local, seen);
+  bool reflects = specular.rgb != vec3(0.0);
+  if (reflects) {
+    prt_seen(N, V, specular.a, local, seen);
+  }
 
   /* Three numbers a coefficient, one after another in texels of four. */
   vec3 irradiance = vec3(0.0);
@@ -99,9 +102,9 @@ void main()
     }
     order += i == (order + 1) * (order + 1) ? 1 : 0;
     irradiance += value * (at_normal[i] * PRT_COSINE[order]);
-    radiance += value * seen[i];
+    radiance += reflects ? value * seen[i] : vec3(0.0);
   }
   out_diffuse = vec4(max(irradiance, vec3(0.0)), 1.0);
-  vec3 reflects = specular.rgb == vec3(0.0) ? vec3(0.0) : bxdf_albedo(specular.rgb, specular.a, cosine);
-  out_glossy = vec4(reflects * max(radiance, vec3(0.0)), 1.0);
+  vec3 part = reflects ? bxdf_albedo(specular.rgb, specular.a, cosine) : vec3(0.0);
+  out_glossy = vec4(part * max(radiance, vec3(0.0)), 1.0);
 }

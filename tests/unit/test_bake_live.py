@@ -9,7 +9,7 @@ from rebound.bake.job import BakeSettings, Kind, bake_objects, glossy_matrices, 
 from rebound.bake.light import Surroundings
 from rebound.bake.live import make_live
 from rebound.bake.sphere import cube_directions, cube_solid_angles, texel_of
-from rebound.bake.surfaces import frame_of
+from rebound.bake.surfaces import frame_of, gather
 from rebound.bake.transfer import finish
 from rebound.gpu_shaders.frame.environment_map import texel_directions, texel_omegas
 from rebound.scene.data import Transfer
@@ -151,3 +151,22 @@ def test_coefficients_are_those_of_the_transfer(kind):
     assert not live.coefficient(24575, 0).any()
     if kind is Kind.GLOSSY:
         assert not live.coefficient(0, 120).any()
+
+
+def test_finest_cube_map_has_the_sharpest_shadow():
+    """6 x 64² texels: beside a wall a small sun is gone or whole, and a white sky is what is left of it."""
+    wall = grid("wall", 4.0, 4)
+    upright = place((0.5, 0, 0), np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]))
+    beside = placed(grid("floor", 4.0, 8), wall, matrices=[np.eye(4), upright])
+    made = BakeSettings(kind=Kind.WAVELET, texels=64, bounces=0, keep=0.9999)
+    bake = finish(bake_objects(beside, ["floor"], made))["floor"]
+    live = make_live(Transfer("floor", bake.about, bake.arrays))
+    surfaces = gather(beside, frozenset(["floor"]))
+    x, y, _ = surfaces.positions[surfaces.runs["floor"]].T
+    d = texel_directions(256)
+    sun = Surroundings(np.repeat((d @ [0.8, 0.0, 0.6] > np.cos(0.02))[..., None], 3, axis=2).astype(float))
+    lit = answer(live, sun, np.eye(3), terms=128)[:, 0, 0]
+    assert lit[(x < 0.4) & (abs(y) < 1.9)].max() < 0.02 * lit[x > 0.6].min(), "behind the wall's sides it is seen"
+    assert lit[x > 0.6].min() == pytest.approx(lit[x > 0.6].max(), rel=1e-3)
+    white = answer(live, Surroundings(np.ones(3)), np.eye(3))[:, 0, 0]
+    assert white[x > 0.6].max() < 0.95 and white.max() <= 1.001
