@@ -5,16 +5,18 @@ from __future__ import annotations
 import time
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from .device.interface import Device, Texture, Vertices
+from .device.interface import Device, Texture
 from .device.shader import Shader
+from .gpu_shaders.frame.batches import Batches
 from .gpu_shaders.frame.environment import Environment
-from .gpu_shaders.frame.material_pass import material_program
+from .gpu_shaders.frame.material_pass import attribute_sampler, material_program
+from .gpu_shaders.frame.mesh_pages import MeshKey, MeshPages, Page
 from .gpu_shaders.frame.reflective_shaders import REFLECT
 from .gpu_shaders.frame.shaders import GBUFFER, SHADOW_PASSING
 from .gpu_shaders.frame.structs import INSTANCE, MATERIAL, MATERIAL_VIEW
@@ -27,16 +29,16 @@ from .scene.data import Image, Instance, Material, Mesh, Scene, View, Visibility
 # Updates whose moved boxes are kept. A light map that was not looked at for longer is drawn again.
 REMEMBERED_MOVES = 64
 
-Layout = tuple[tuple[str, Attribute], ...]  # vertex inputs beside position and normal, and what of the mesh they take
-
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One draw call: a run of triangles of one mesh with one material, for a run of instances."""
+    """A run of triangles of one mesh with one material, for a run of instances; batches are drawn, of many of these."""
 
-    vertices: Vertices
-    first_vertex: int
-    vertex_count: int
+    number: int  # its place in GpuScene.draws
+    page: Page
+    first_on_page: int  # triangle
+    first_triangle: int  # of the mesh
+    triangle_count: int
     first_instance: int
     instance_count: int
     material: int
@@ -60,10 +62,12 @@ class GpuScene:
         self.revision = 0  # grows with every update that changes something
         self._moved: list[tuple[int, np.ndarray, np.ndarray]] = []  # revision, boxes, those of them with other shapes
         self._placed: list[Instance] = []  # those of every row
-        self._told = np.zeros((0, 12))  # what materials can ask of them beside their place: _instance_row()
+        self._told = np.zeros((0, 13))  # what materials can ask of them beside their place: _instance_row()
         self.seen_through: tuple[Draw, ...] = ()  # what a camera may look through
         self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of what blocks a part of lamps' light
-        self._meshes: dict[tuple[Hashable, Layout], Vertices] = {}
+        self._visible: dict[int, tuple[tuple[Draw, ...], np.ndarray]] = {}
+        self._meshes = MeshPages(device, self.uploads)
+        self.batches = Batches(device)
         self._images: dict[Hashable, Texture] = {}
         self.environment = Environment(device)
         self._codes: tuple[MaterialShader | None, ...] = ()  # of each material
@@ -82,6 +86,8 @@ class GpuScene:
         self.scene = scene
         if changes.any:
             self.revision += 1
+        if changes.materials or changes.images:
+            self.batches.forget()
         for key in changes.images_removed:
             self.device.free(self._images.pop(key))
         for key in changes.images_added:
@@ -158,6 +164,8 @@ class GpuScene:
             if time.perf_counter() > end:
                 break
         self.waits, self._unchecked = bool(missing), False
+        if waited or self.waits:
+            self.batches.forget()
         self._find_passing()
         return waited
 
@@ -198,28 +206,58 @@ class GpuScene:
             given["material_view"] = self._view
         return given
 
-    def own_inputs(self, material: int) -> dict[str, Any]:
-        """What such a program wants to know of a draw's material."""
-        given: dict[str, Any] = {"pc_material": material}
+    def image_inputs(self, material: int) -> dict[str, Texture]:
+        """The images that such a program wants of a material."""
         graph = self.scene.materials[material].graph
-        if graph is not None and self.code_of(material) is not None:
+        if graph is None or self.code_of(material) is None:
+            return {}
+        return {f"image_{k}_tx": self._images[key] for k, key in enumerate(graph.images)}
+
+    def attribute_inputs(self, material: int, page: Page) -> dict[str, Texture]:
+        """What it wants of a page of meshes."""
+        code = self.code_of(material)
+        fields = {} if code is None else code.mesh_fields
+        return {attribute_sampler(name): page.attributes[attribute] for name, attribute in fields.items()}
+
+    def own_inputs(self, material: int) -> dict[str, Any]:
+        """What a program that draws no meshes wants to know of its one material."""
+        given: dict[str, Any] = {"pc_material": material, **self.image_inputs(material)}
+        if self.code_of(material) is not None:
             given["pc_values"] = self._first_values[material]
-            given |= {f"image_{k}_tx": self._images[key] for k, key in enumerate(graph.images)}
         return given
+
+    def visible(self, visibility: Visibility) -> tuple[tuple[Draw, ...], np.ndarray]:
+        """The draws that take part in any of ``visibility``, and their bounds (n, 2, 3)."""
+        wanted = visibility.value  # plain numbers: flags are ten times as slow
+        if wanted not in self._visible:
+            found = tuple([draw for draw in self.draws if draw.visibility.value & wanted])
+            self._visible[wanted] = found, np.array([draw.bounds for draw in found]).reshape(-1, 2, 3)
+        return self._visible[wanted]
+
+    def divided(self, draws: Sequence[Draw]) -> tuple[Sequence[Draw], Sequence[Draw]]:
+        """Those of ``draws`` that stop all light of lamps, and those that let some of it pass."""
+        if not len(self.passing_boxes):
+            return draws, ()
+        passes = {material: self.lets_lamps_pass(material) for material in {draw.material for draw in draws}}
+        return [d for d in draws if not passes[d.material]], [d for d in draws if passes[d.material]]
 
     @property
     def triangle_count(self) -> int:
-        return sum(draw.vertex_count // 3 * draw.instance_count for draw in self.draws)
+        return sum(draw.triangle_count * draw.instance_count for draw in self.draws)
 
     def free(self) -> None:
         tables = self.instance_table, self.material_table, self.value_table
-        for resource in (*self._meshes.values(), *self._images.values(), *tables):
+        for resource in (*self._images.values(), *tables):
             self.device.free(resource)
         self.environment.free()
-        self._meshes.clear()
+        self._meshes.free()
+        self.batches.forget()
         self._images.clear()
         self.instance_table = self.material_table = self.value_table = None
-        self.draws = ()
+        self._show(())
+
+    def _show(self, draws: tuple[Draw, ...]) -> None:
+        self.draws, self._visible = draws, {}
 
     def _upload_image(self, image: Image) -> Texture:
         self.uploads["images"] += 1
@@ -232,11 +270,15 @@ class GpuScene:
 
     def _upload_materials(self, materials: tuple[Material, ...]) -> None:
         self.uploads["materials"] += 1
-        rows = [{field.name: getattr(m, field.name) for field in MATERIAL.fields} for m in materials]
-        self.material_table = replace_table(self.device, MATERIAL.pack(rows), self.material_table)
         self._codes = tuple(None if m.graph is None else generate(m.graph.graph) for m in materials)
         tables = [np.zeros((1, 4), np.float32) if m.graph is None else m.graph.table for m in materials]
         self._first_values = tuple(np.cumsum([0, *map(len, tables)])[:-1].tolist())
+        told = [field.name for field in MATERIAL.fields if field.name != "first_value"]
+        rows = [
+            {name: getattr(material, name) for name in told} | {"first_value": first}
+            for material, first in zip(materials, self._first_values, strict=True)
+        ]
+        self.material_table = replace_table(self.device, MATERIAL.pack(rows), self.material_table)
         texels = np.concatenate([*tables, np.zeros((1, 4), np.float32)])
         self.value_table = replace_texels(self.device, texels, self.value_table)
 
@@ -247,26 +289,26 @@ class GpuScene:
             groups[instance.mesh, instance.materials, instance.visibility].append(instance)
         placed = [instance for members in groups.values() for instance in members]
         boxes = world_boxes(placed, scene)
-        layouts = self._layouts(scene)
-        draws, wanted, start = [], set(), 0
+        held = self._mesh_keys(scene)
+        self._meshes.hold({key: scene.meshes[mesh] for mesh, key in held.items()})
+        draws: list[Draw] = []
+        start = 0
         for (mesh_key, materials, visibility), members in groups.items():
             mesh, end = scene.meshes[mesh_key], start + len(members)
             bounds = np.stack([boxes[start:end, 0].min(0), boxes[start:end, 1].max(0)])
+            page, on_page = self._meshes.place(held[mesh_key])
             for slot, first, count in mesh.slots:
                 material = materials[min(slot, len(materials) - 1)]
-                layout = layouts[mesh_key, material]
-                wanted.add((mesh_key, layout))
-                vertices = self._vertices(mesh, layout)
-                place = (3 * first, 3 * count, start, len(members), material, visibility, bounds)
-                draws.append(Draw(vertices, *place, mesh))
+                run = (on_page + first, first, count, start, len(members))
+                draws.append(Draw(len(draws), page, *run, material, visibility, bounds, mesh))
             start = end
-        for key in self._meshes.keys() - wanted:
-            self.device.free(self._meshes.pop(key))
         self.matrices = np.array([i.world_from_object for i in placed], np.float64).reshape(-1, 4, 4)
         told = [_instance_row(instance, scene.meshes[instance.mesh]) for instance in placed]
-        self._told = np.array(told, np.float64).reshape(-1, 12)
+        self._told = np.array(told, np.float64).reshape(-1, 13)
         self._upload_instances()
-        self.draws, self._placed = tuple(draws), placed
+        self._show(tuple(draws))
+        self.batches.place(self.draws)
+        self._placed = placed
         self.boxes = boxes if placed else np.zeros((1, 2, 3))
 
     def _move(self, scene: Scene) -> bool:
@@ -282,7 +324,7 @@ class GpuScene:
         self.matrices[moved] = [instance.world_from_object for instance in of_moved]
         self.boxes[moved] = world_boxes(of_moved, scene)
         self._upload_instances()
-        self.draws = tuple(self._with_new_bounds(draw, moved) for draw in self.draws)
+        self._show(tuple(self._with_new_bounds(draw, moved) for draw in self.draws))
         return True
 
     def _with_new_bounds(self, draw: Draw, moved: list[int]) -> Draw:
@@ -302,39 +344,17 @@ class GpuScene:
             texture_scale=told[:, 7:10],
             random=told[:, 10],
             index=told[:, 11],
+            visibility=told[:, 12].astype(np.int32),
         )
         self.instance_table = replace_table(self.device, packed, self.instance_table)
 
-    def _layouts(self, scene: Scene) -> dict[tuple[Hashable, int], Layout]:
-        """The vertex inputs of each mesh with each of its materials: one set for as many of them as agree."""
-        asked: dict[Hashable, dict[int, None]] = defaultdict(dict)
-        for instance in scene.instances:
-            asked[instance.mesh].update(dict.fromkeys(instance.materials))
-        found = {}
-        for mesh, materials in asked.items():
-            sets: list[dict[str, Attribute]] = []
-            chosen = {}
-            for material in materials:
-                code = self._codes[material]
-                wanted = {} if code is None else {f"in_{name}": a for name, a in code.mesh_fields.items()}
-                fitting = next((s for s in sets if all(s.get(n, a) == a for n, a in wanted.items())), None)
-                if fitting is None:
-                    fitting = {}
-                    sets.append(fitting)
-                fitting.update(wanted)
-                chosen[material] = fitting
-            found |= {(mesh, material): tuple(sorted(c.items(), key=_by_name)) for material, c in chosen.items()}
-        return found
-
-    def _vertices(self, mesh: Mesh, layout: Layout) -> Vertices:
-        key = (mesh.key, layout)
-        if key not in self._meshes:
-            self.uploads["meshes"] += 1
-            attributes = {name: mesh.corner_attribute(a.field, a.name) for name, a in layout}
-            self._meshes[key] = self.device.vertices(
-                {"in_position": mesh.positions, "in_normal": mesh.normals, **attributes}
-            )
-        return self._meshes[key]
+    def _mesh_keys(self, scene: Scene) -> dict[Hashable, MeshKey]:
+        """What each mesh that is placed is held by."""
+        asked: dict[Hashable, set[Attribute]] = defaultdict(set)
+        for mesh, materials in {(instance.mesh, instance.materials) for instance in scene.instances}:
+            codes = [self._codes[material] for material in materials]
+            asked[mesh].update(a for code in codes if code is not None for a in code.mesh_fields.values())
+        return {mesh: (mesh, frozenset(attributes)) for mesh, attributes in asked.items()}
 
 
 def _same_draw(a: Instance, b: Instance | None) -> bool:
@@ -343,12 +363,15 @@ def _same_draw(a: Instance, b: Instance | None) -> bool:
     return (a.mesh, a.materials, a.visibility) == (b.mesh, b.materials, b.visibility)
 
 
-def _by_name(item: tuple[str, Attribute]) -> str:
-    return item[0]
-
-
 def _instance_row(instance: Instance, mesh: Mesh) -> tuple[float, ...]:
-    """Colour, texture_origin, texture_scale, random, index."""
+    """Colour, texture_origin, texture_scale, random, index, visibility."""
     lower, upper = mesh.bounds if mesh.texture_space is None else mesh.texture_space
     scale = 1.0 / np.maximum(upper - lower, 1e-20)
-    return (*instance.color, *lower.tolist(), *scale.tolist(), instance.random, float(instance.index))
+    return (
+        *instance.color,
+        *lower.tolist(),
+        *scale.tolist(),
+        instance.random,
+        float(instance.index),
+        instance.visibility.value,
+    )

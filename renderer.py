@@ -242,18 +242,12 @@ class Renderer:
 
     def _draw_gbuffer(self, frame: Frame, inputs: FrameInputs) -> None:
         self.device.clear(frame.background_target)
-
-        def each(draw: Draw) -> dict:
-            holdout, alone = Visibility.HOLDOUT in draw.visibility, Visibility.NO_INDIRECT in draw.visibility
-            return {"pc_holdout": int(holdout), "pc_no_indirect": int(alone)}
-
         draw_scene(
             self.device,
             inputs.gpu_scene,
             GBUFFER,
             frame.gbuffer_target,
             visible_draws(inputs.gpu_scene, Visibility.CAMERA | Visibility.HOLDOUT),
-            each,
             pc_clip_from_world=inputs.clip_from_world,
             pc_eye=inputs.eye,
             pc_dither=inputs.noise_seed(4) + inputs.sample,
@@ -268,7 +262,7 @@ class Renderer:
             frame.tint_target,
             passed,
             state=DrawState(depth_test="LESS", blend="MULTIPLY"),
-            lets_pass=lambda material: False,  # it decides nothing
+            lets_pass=_decides_nothing,
             pc_clip_from_world=inputs.clip_from_world,
             pc_eye=inputs.eye,
         )
@@ -343,6 +337,10 @@ class Renderer:
             technique.view(view.key, inputs, values, target, light)
 
         draw_technique_view(self.device, view, frame.extras, scratch, combined, frame.samples, draw)
+
+
+def _decides_nothing(material: int) -> bool:
+    return False
 
 
 def _background(gpu_scene: GpuScene) -> tuple[float, float, float]:

@@ -238,7 +238,9 @@ class BlenderDevice(Device):
         if instances == 1:
             batch.draw_range(program.handle, elem_start=first, elem_count=count)
             return
-        if count != whole:
+        if vertices is None and not first:
+            batch = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=count)])
+        elif count != whole:
             batch = _indexed(cache, buffers, first, count)
         batch.draw_instanced(program.handle, instance_start=0, instance_count=instances)
 

@@ -120,18 +120,16 @@ class DirectLight:
         for done, tile in enumerate(stale):
             target, viewport = self.maps.begin(tile, gpu_scene)
             draws = visible_draws(gpu_scene, Visibility.SHADOW, tile.face.sees)
-            passing = [gpu_scene.lets_lamps_pass(draw.material) for draw in draws]
+            solid, thin = gpu_scene.divided(draws)
             face = {
                 "pc_clip_from_world": tile.face.clip_from_world,
                 "pc_perspective": int(tile.face.perspective),
                 "pc_far": tile.face.far,
                 "pc_tile": float(viewport[2]),
             }
-            solid = [draw for draw, passes in zip(draws, passing, strict=True) if not passes]
             draw_scene(self.device, gpu_scene, SHADOW, target, solid, viewport=viewport, **face)
-            if any(passing):
+            if thin:
                 extra = {"pc_eye": tile.face.eye, "pc_dither": dither}
-                thin = [draw for draw, passes in zip(draws, passing, strict=True) if passes]
                 draw_scene(self.device, gpu_scene, SHADOW_PASSING, target, thin, viewport=viewport, **face, **extra)
             yield (done + 1) / len(stale)
 

@@ -4,7 +4,7 @@
 /* The surface as it looks on average from all sides; surface_toward() tells what it does from one. */
 Surface material_evaluate(inout MaterialPlace place)
 {
-  Material material = material_fetch(material_tx, pc_material);
+  Material material = material_fetch(material_tx, MATERIAL_INDEX);
   Surface surface;
   vec3 base = material.base_color;
   surface.diffuse = base * (1.0 - material.metallic);

@@ -30,9 +30,10 @@ FIELDS = {
     "object_color": "instance.color",
     "object_index": "instance.index",
     "object_random": "instance.random",
-    "material_index": "material_fetch(material_tx, pc_material).index",
+    "material_index": "material_fetch(material_tx, MATERIAL_INDEX).index",
 }
 SIZES = {"uv": ("VEC2", "vec2"), "color": ("VEC4", "vec4")}
+SWIZZLES = {"uv": "xy", "color": "xyzw"}
 _POINT_ATTRIBUTE = """vec4 point_attribute(int number)
 {
   int at = v_point * pc_attributes + number;
@@ -53,36 +54,42 @@ vec3 material_window(vec4 clip)
 """
 
 
+def attribute_sampler(field: str) -> str:
+    """The texture of one of ``MaterialShader.mesh_fields``, where meshes are drawn."""
+    return f"{field}_tx"
+
+
 @lru_cache(maxsize=4096)
 def material_program(plain: Shader, code: MaterialShader | None, passes: bool = False) -> Shader:
     """The variant of a pass for a graph. ``plain``: its declaration for constants; ``passes``: some light goes through.
 
-    Where it draws meshes its attributes are inputs `in_uv`, `in_uv_0`, `in_color_1`, …; a pass without vertex inputs
-    gets them from attribute_tx, in the order of ``MaterialShader.mesh_fields`` for each point.
+    Where it draws meshes it gets their attributes from `uv_tx`, `uv_0_tx`, `color_1_tx`, …; a pass that does not, from
+    attribute_tx, in the order of ``MaterialShader.mesh_fields`` for each point.
     """
     passing = (("MATERIAL_PASSES", "1"),) if passes else ()
     if code is None:
         return plain if not passes else replace(plain, defines=(*plain.defines, *passing))
-    meshes = bool(plain.inputs)
+    meshes = "chunk_tx" in plain.samplers
     asks_view = any(FIELDS.get(need, "").find("material_view") >= 0 for need in code.needs)
     # Of fields that need the instance, those of a point are always there.
     asks_object = meshes and any(word in FIELDS.get(n, "") for n in code.needs for word in ("instance", "object_pos"))
+    named = [("MATERIAL_GRAPH", meshes), ("MATERIAL_OBJECT", asks_object)]
+    drawn = tuple((name, "1") for name, wanted in named if wanted)
     files = {"frame/material_lib.glsl": _evaluate(code, meshes)}
     varyings = dict(plain.varyings)
-    inputs = dict(plain.inputs)
+    samplers = {**plain.samplers, **code.samplers}
     if meshes:
         files["frame/material_corner_lib.glsl"] = _corner(code)
         varyings |= {f"v_{name}": SIZES[a.field][0] for name, a in code.mesh_fields.items()}
-        inputs |= {f"in_{name}": SIZES[a.field][0] for name, a in code.mesh_fields.items()}
-        varyings |= {"v_object_position": "VEC3", "v_instance": "flat INT"} if asks_object else {}
+        samplers |= dict.fromkeys(map(attribute_sampler, code.mesh_fields), "FLOAT_2D")
+        varyings |= {"v_object_position": "VEC3"} if asks_object else {}
     return replace(
         plain,
-        inputs=inputs,
         varyings=varyings,
-        samplers={**plain.samplers, **code.samplers},
+        samplers=samplers,
         uniforms={**plain.uniforms, **({"material_view": MATERIAL_VIEW} if asks_view else {})},
-        constants={**plain.constants, "pc_values": "INT"},
-        defines=(*plain.defines, *code.defines, *passing, *((("MATERIAL_OBJECT", "1"),) if asks_object else ())),
+        constants=plain.constants if meshes else {**plain.constants, "pc_values": "INT"},
+        defines=(*plain.defines, *code.defines, *passing, *drawn),
         files={**plain.files, **files},
     )
 
@@ -107,5 +114,9 @@ def _evaluate(code: MaterialShader, meshes: bool) -> str:
 
 
 def _corner(code: MaterialShader) -> str:
-    lines = "".join(f"  v_{name} = in_{name};\n" for name in code.mesh_fields)
-    return f"void material_corner()\n{{\n{lines}}}\n"
+    lines = "".join(
+        f"  v_{name} = texelFetch({attribute_sampler(name)}, texel, 0).{SWIZZLES[a.field]};\n"
+        for name, a in code.mesh_fields.items()
+    )
+    at = "  ivec2 texel = ivec2(on_page % MESH_PAGE_WIDTH, on_page / MESH_PAGE_WIDTH);\n" if lines else ""
+    return f"void material_corner(int on_page)\n{{\n{at}{lines}}}\n"

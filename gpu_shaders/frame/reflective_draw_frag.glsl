@@ -27,7 +27,7 @@ void main()
     measure *= cosine * cosine * cosine;
   }
   Surface surface = material_drawn(place);
-  float reflects = float(pc_reflects);
+  float reflects = (v_drawn.w & VISIBILITY_BOUNCE) != 0 ? 1.0 : 0.0;
   /* A sun's wide map sends no light from where the one inside it does. */
   if (pc_served >= 0) {
     MapFace inner = map_face_fetch(face_tx, pc_served);

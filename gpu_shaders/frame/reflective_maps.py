@@ -18,7 +18,7 @@ from .structs import LIGHT
 from .tables import replace_table
 
 if TYPE_CHECKING:
-    from ...gpu_scene import Draw, GpuScene
+    from ...gpu_scene import GpuScene
 
 # What a light's picture does not depend on: where its tiles lie in the table of faces.
 _PLACE = {"first_face": 0}
@@ -111,16 +111,12 @@ class ReflectiveShadowMaps(LightMaps):
         target, viewport = self.begin(tile, gpu_scene)
         draws = visible_draws(gpu_scene, Visibility.SHADOW | Visibility.BOUNCE, tile.face.sees)
 
-        def each(draw: Draw) -> dict:
-            return {"pc_reflects": int(bool(draw.visibility & Visibility.BOUNCE))}
-
         draw_scene(
             self.device,
             gpu_scene,
             REFLECT,
             target,
             draws,
-            each,
             viewport,
             lets_pass=gpu_scene.lets_lamps_pass,
             light_tx=self.light_table,

@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 from ...device.shader import Shader
-from .shaders import MESH_INPUTS, MESH_SAMPLERS, MESH_VARYINGS
+from .shaders import SURFACE_DEFINES, SURFACE_SAMPLERS, SURFACE_VARYINGS
 from .structs import INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
 
 
@@ -22,16 +22,13 @@ REFLECT = Shader(
     name="frame_reflective_draw",
     vertex="frame/frame_draw_vert.glsl",
     fragment="frame/reflective_draw_frag.glsl",
-    inputs=MESH_INPUTS,
-    varyings=MESH_VARYINGS,
+    varyings=SURFACE_VARYINGS,
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_specular": "VEC4"},
-    samplers={**MESH_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
+    samplers={**SURFACE_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
     structs=(INSTANCE, MATERIAL, LIGHT, MAP_FACE),
     constants={
         "pc_clip_from_world": "MAT4",
-        "pc_first_instance": "INT",
-        "pc_material": "INT",
-        "pc_reflects": "INT",
+        "pc_first_chunk": "INT",
         "pc_light": "INT",
         "pc_perspective": "INT",
         "pc_far": "FLOAT",
@@ -39,6 +36,6 @@ REFLECT = Shader(
         "pc_served": "INT",
         "pc_dither": "INT",
     },
-    defines=(*LIGHT_DEFINES, *MAP_DEFINES, *SOURCE_DEFINES, ("MATERIAL_CAMERA_RAY", "0")),
+    defines=(*SURFACE_DEFINES, *LIGHT_DEFINES, *MAP_DEFINES, *SOURCE_DEFINES, ("MATERIAL_CAMERA_RAY", "0")),
     depth_write=True,
 )

@@ -4,7 +4,16 @@ from collections.abc import Sequence
 
 from ...device.shader import Shader
 from ...scene.data import LightKind
-from .structs import INSTANCE, LIGHT, LIGHT_DEFINES, MAP_DEFINES, MAP_FACE, MATERIAL
+from .structs import (
+    INSTANCE,
+    LIGHT,
+    LIGHT_DEFINES,
+    MAP_DEFINES,
+    MAP_FACE,
+    MATERIAL,
+    MESH_DEFINES,
+    VISIBILITY_DEFINES,
+)
 
 # What a picture can keep a sum of.
 SUMS = (
@@ -22,16 +31,23 @@ SUMS = (
     "transmission_color",
 )
 
-MESH_INPUTS = {"in_position": "VEC3", "in_normal": "VEC3"}
-MESH_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3"}
-MESH_SAMPLERS = {"instance_tx": "FLOAT_2D", "material_tx": "FLOAT_2D"}
+# What passes that draw meshes are given beside their own (batches.py), and those that ask for materials.
+MESH_SAMPLERS = {"chunk_tx": "FLOAT_2D", "corner_tx": "FLOAT_2D", "instance_tx": "FLOAT_2D"}
+SURFACE_SAMPLERS = {**MESH_SAMPLERS, "material_tx": "FLOAT_2D"}
+# v_drawn: rows of instance and material, first value of its graph, visibility.
+SURFACE_VARYINGS = {"v_position": "VEC3", "v_normal": "VEC3", "v_drawn": "flat IVEC4"}
+SURFACE_DEFINES = (
+    *MESH_DEFINES,
+    *VISIBILITY_DEFINES,
+    ("MATERIAL_INDEX", "v_drawn.y"),
+    ("MATERIAL_VALUES", "v_drawn.z"),
+)
 
 GBUFFER = Shader(
     name="frame_gbuffer",
     vertex="frame/frame_draw_vert.glsl",
     fragment="frame/frame_gbuffer_frag.glsl",
-    inputs=MESH_INPUTS,
-    varyings=MESH_VARYINGS,
+    varyings=SURFACE_VARYINGS,
     outputs={
         "out_albedo": "VEC4",
         "out_emission": "VEC4",
@@ -39,18 +55,15 @@ GBUFFER = Shader(
         "out_normal": "VEC4",
         "out_specular": "VEC4",
     },
-    samplers=MESH_SAMPLERS,
+    samplers=SURFACE_SAMPLERS,
     structs=(INSTANCE, MATERIAL),
     constants={
         "pc_clip_from_world": "MAT4",
         "pc_eye": "VEC4",  # camera position and 1, or for an orthographic view the direction to it and 0
-        "pc_first_instance": "INT",
-        "pc_material": "INT",
-        "pc_holdout": "INT",
-        "pc_no_indirect": "INT",
+        "pc_first_chunk": "INT",
         "pc_dither": "INT",
     },
-    defines=(("MATERIAL_CAMERA_RAY", "1"),),
+    defines=(*SURFACE_DEFINES, ("MATERIAL_CAMERA_RAY", "1")),
 )
 
 # The colour of what was passed on the way to the surface that is seen.
@@ -58,23 +71,21 @@ TINT = Shader(
     name="frame_tint",
     vertex="frame/frame_draw_vert.glsl",
     fragment="frame/frame_tint_frag.glsl",
-    inputs=MESH_INPUTS,
-    varyings=MESH_VARYINGS,
+    varyings=SURFACE_VARYINGS,
     outputs={"out_albedo": "VEC4", "out_emission": "VEC4", "out_specular": "VEC4", "out_passed": "VEC4"},
-    samplers=MESH_SAMPLERS,
+    samplers=SURFACE_SAMPLERS,
     structs=(INSTANCE, MATERIAL),
     constants={
         "pc_clip_from_world": "MAT4",
         "pc_eye": "VEC4",
-        "pc_first_instance": "INT",
-        "pc_material": "INT",
+        "pc_first_chunk": "INT",
     },
-    defines=(("MATERIAL_CAMERA_RAY", "1"),),
+    defines=(*SURFACE_DEFINES, ("MATERIAL_CAMERA_RAY", "1")),
 )
 
 _SHADOW_CONSTANTS = {
     "pc_clip_from_world": "MAT4",
-    "pc_first_instance": "INT",
+    "pc_first_chunk": "INT",
     "pc_perspective": "INT",
     "pc_far": "FLOAT",
     "pc_tile": "FLOAT",
@@ -84,13 +95,12 @@ SHADOW = Shader(
     name="shadow_draw",
     vertex="frame/shadow_draw_vert.glsl",
     fragment="frame/shadow_draw_frag.glsl",
-    inputs={"in_position": "VEC3"},
     varyings={"v_depth": "FLOAT"},
     outputs={"out_slope": "VEC4"},
-    samplers={"instance_tx": "FLOAT_2D"},
+    samplers=MESH_SAMPLERS,
     structs=(INSTANCE, MAP_FACE),
     constants=_SHADOW_CONSTANTS,
-    defines=MAP_DEFINES,
+    defines=(*MESH_DEFINES, *MAP_DEFINES),
     depth_write=True,
 )
 
@@ -99,13 +109,12 @@ SHADOW_PASSING = Shader(
     name="shadow_passing",
     vertex="frame/frame_draw_vert.glsl",
     fragment="frame/shadow_passing_frag.glsl",
-    inputs=MESH_INPUTS,
-    varyings={**MESH_VARYINGS, "v_depth": "FLOAT"},
+    varyings={**SURFACE_VARYINGS, "v_depth": "FLOAT"},
     outputs={"out_slope": "VEC4"},
-    samplers=MESH_SAMPLERS,
+    samplers=SURFACE_SAMPLERS,
     structs=(INSTANCE, MATERIAL, MAP_FACE),
-    constants={**_SHADOW_CONSTANTS, "pc_eye": "VEC4", "pc_material": "INT", "pc_dither": "INT"},
-    defines=(*MAP_DEFINES, ("MATERIAL_CAMERA_RAY", "0"), ("MAP_DEPTH", "1")),
+    constants={**_SHADOW_CONSTANTS, "pc_eye": "VEC4", "pc_dither": "INT"},
+    defines=(*SURFACE_DEFINES, *MAP_DEFINES, ("MATERIAL_CAMERA_RAY", "0"), ("MAP_DEPTH", "1")),
     depth_write=True,
 )
 

@@ -1,8 +1,10 @@
 """Tables that the frame's shaders read, and the numbers in them that have names: one declaration for numpy and GLSL."""
 
 from ...device.structs import Struct
-from ...scene.data import LightKind
+from ...scene.data import LightKind, Visibility
+from ..materials import VALUE_WIDTH
 from .maps import FAR_BITS, NEAR_BITS
+from .mesh_pages import PAGE_WIDTH
 
 LIGHT_KINDS = {kind: number for number, kind in enumerate(LightKind)}
 
@@ -17,6 +19,19 @@ INSTANCE = Struct(
     random="float",
     texture_scale="vec3",
     index="float",
+    visibility="int",  # scene.data.Visibility
+)
+
+VISIBILITY_DEFINES = tuple((f"VISIBILITY_{flag.name}", str(flag.value)) for flag in Visibility)
+
+# What a vertex shader finds of a mesh at once, and what the last of a mesh may be short of.
+CHUNK_TRIANGLES = 16
+CHUNK_CORNERS = 3 * CHUNK_TRIANGLES
+MESH_DEFINES = (
+    ("CHUNK_TRIANGLES", str(CHUNK_TRIANGLES)),
+    ("CHUNK_SHIFT", str(CHUNK_TRIANGLES.bit_length() - 1)),
+    ("CHUNK_ROW", str(VALUE_WIDTH)),
+    ("MESH_PAGE_WIDTH", str(PAGE_WIDTH)),
 )
 
 MATERIAL = Struct(
@@ -28,6 +43,7 @@ MATERIAL = Struct(
     specular="vec3",  # reflectance at normal incidence of the dielectric part, 0: none
     layered="float",  # how much of `specular` lies over the diffuse part and takes from it
     index="float",
+    first_value="int",  # of its graph: a texel of value_tx
 )
 
 # The camera, for materials that ask where they are seen.

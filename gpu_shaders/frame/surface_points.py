@@ -15,7 +15,6 @@ from ..materials import VALUE_WIDTH
 from .draws import visible_draws
 from .material_pass import material_program
 from .reflective_shaders import SOURCE_DEFINES
-from .shaders import MESH_SAMPLERS
 from .structs import INSTANCE, MATERIAL
 from .tables import replace_table, replace_texels
 from .voxel_grids import grid_bounds
@@ -46,7 +45,12 @@ SURFACE_POINT_DRAW = Shader(
     fragment="frame/surface_point_draw_frag.glsl",
     varyings={"v_point": "flat INT"},
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_reflectance": "VEC4"},
-    samplers={**MESH_SAMPLERS, "point_tx": "FLOAT_2D", "attribute_tx": "FLOAT_2D"},
+    samplers={
+        "instance_tx": "FLOAT_2D",
+        "material_tx": "FLOAT_2D",
+        "point_tx": "FLOAT_2D",
+        "attribute_tx": "FLOAT_2D",
+    },
     structs=(INSTANCE, MATERIAL, SURFACE_POINT),
     constants={
         "pc_first_point": "INT",
@@ -58,6 +62,7 @@ SURFACE_POINT_DRAW = Shader(
     defines=(
         *SOURCE_DEFINES,
         ("MATERIAL_CAMERA_RAY", "0"),
+        ("MATERIAL_INDEX", "pc_material"),
         ("MATERIAL_SCATTERED", "1"),
         ("ATTRIBUTE_WIDTH", str(VALUE_WIDTH)),
     ),
@@ -172,7 +177,7 @@ class SurfacePoints:
 
 
 def _part(draw: Draw, gpu_scene: GpuScene, density: float) -> Part:
-    triangles = draw.first_vertex // 3, draw.vertex_count // 3
+    triangles = draw.first_triangle, draw.triangle_count
     instances = draw.first_instance, draw.instance_count
     code = gpu_scene.code_of(draw.material)
     asked = () if code is None else tuple((a.field, a.name) for a in code.mesh_fields.values())

@@ -2,7 +2,8 @@
 
 from ...device.shader import Image, Shader
 from ...device.structs import Struct
-from .structs import INSTANCE
+from .shaders import MESH_SAMPLERS
+from .structs import INSTANCE, MESH_DEFINES
 
 MOST_OUTER_GRIDS = 5
 
@@ -27,12 +28,12 @@ VOXEL_DRAW = Shader(
     name="voxel_draw",
     vertex="frame/shadow_draw_vert.glsl",
     fragment="frame/voxel_draw_frag.glsl",
-    inputs={"in_position": "VEC3"},
     varyings={"v_depth": "FLOAT"},
     outputs={"out_nothing": "VEC4"},
-    samplers={"instance_tx": "FLOAT_2D"},
+    samplers=MESH_SAMPLERS,
     images={"voxel_img": Image("R32UI", "UINT_3D_ATOMIC")},
     uniforms={"voxel_grid": VOXEL_GRID},
     structs=(INSTANCE,),
-    constants={"pc_clip_from_world": "MAT4", "pc_first_instance": "INT", "pc_axis": "INT", "pc_grid": "INT"},
+    constants={"pc_clip_from_world": "MAT4", "pc_first_chunk": "INT", "pc_axis": "INT", "pc_grid": "INT"},
+    defines=MESH_DEFINES,
 )

@@ -16,7 +16,9 @@ import numpy as np
 
 from ...device.interface import Device, Target, Texture
 from ...scene.data import Visibility
-from .draws import ADD, draw_scene, visible_draws
+from .batches import Batch
+from .draws import ADD, draw_batches, visible_draws
+from .structs import CHUNK_TRIANGLES
 from .voxel_grids import VoxelGrid, grid_bounds, nested_grids, pack_grids, volume_size
 from .voxel_shaders import VOXEL_DRAW, VOXEL_GRID, VOXEL_SAMPLERS
 
@@ -64,14 +66,15 @@ class Voxels:
             return
         self._holds = None
         self._allocate(nested_grids(gpu_scene.boxes, resolution))
-        pieces = []
         for index in range(len(self.grids)):
             seen = self.grids[0].reached_from_outside if index else None
             draws = [d for d in visible_draws(gpu_scene, Visibility.SHADOW, seen) if _blocks(d, gpu_scene)]
-            pieces += [(index, axis, piece) for piece in _pieces(draws) for axis in range(3)]
-        for number, (index, axis, draws) in enumerate(pieces, 1):
-            self._draw(gpu_scene, index, axis, draws)
-            yield number / len(pieces)
+            batches = gpu_scene.batches.of(gpu_scene, VOXEL_DRAW, draws, gpu_scene.lets_pass)
+            pieces = list(_pieces(batches))
+            for number, piece in enumerate(pieces, 1):
+                for axis in range(3):
+                    self._draw(gpu_scene, index, axis, piece)
+                    yield (index + (number + (axis - 2) / 3) / len(pieces)) / len(self.grids)
         self.built += 1
         self._holds = resolution, gpu_scene.revision
 
@@ -100,15 +103,14 @@ class Voxels:
         side = max(int(grid.size.max()) for grid in grids)
         self._canvas = self.device.target([self.device.texture((side, side), "R8")])
 
-    def _draw(self, gpu_scene: GpuScene, index: int, axis: int, draws: Sequence[Draw]) -> None:
+    def _draw(self, gpu_scene: GpuScene, index: int, axis: int, batches: Sequence[Batch]) -> None:
         assert self._canvas is not None
         grid = self.grids[index]
-        draw_scene(
+        draw_batches(
             self.device,
             gpu_scene,
-            VOXEL_DRAW,
             self._canvas,
-            draws,
+            batches,
             viewport=grid.viewport(axis),
             # Blended, though nothing is added: where an opaque triangle covers a whole tile of the canvas, Mesa's
             # software renderer leaves out what was drawn there before, and what it would have marked.
@@ -121,15 +123,16 @@ class Voxels:
         )
 
 
-def _pieces(draws: Sequence[Draw]) -> Iterator[list[Draw]]:
-    """Runs of draws with about PIECE_TRIANGLES each; large meshes in parts."""
+def _pieces(batches: Sequence[Batch]) -> Iterator[list[Batch]]:
+    """Runs of draw calls with about PIECE_TRIANGLES each; long ones in parts."""
     piece, triangles = [], 0
-    for draw in draws:
-        longest = 3 * max(PIECE_TRIANGLES // draw.instance_count, 1)
-        for first in range(0, draw.vertex_count, longest):
-            count = min(longest, draw.vertex_count - first)
-            piece.append(replace(draw, first_vertex=draw.first_vertex + first, vertex_count=count))
-            triangles += count // 3 * draw.instance_count
+    for batch in batches:
+        longest = max(PIECE_TRIANGLES // (CHUNK_TRIANGLES * batch.instances), 1)
+        for first in range(0, batch.chunk_count, longest):
+            count = min(longest, batch.chunk_count - first)
+            part = replace(batch, first_chunk=batch.first_chunk + first, chunk_count=count)
+            piece.append(part)
+            triangles += part.triangles
             if triangles >= PIECE_TRIANGLES:
                 yield piece
                 piece, triangles = [], 0

@@ -1,7 +1,8 @@
 """NodeGraph -> the GLSL function `MaterialSurface material_surface(MaterialPoint point)` and what it asks for.
 
 A pure function of the graph: equal graphs give equal text, and so share one program. Numbers are read from the
-sampler `value_tx`, VALUE_WIDTH texels a row, from texel `pc_values` on; images from `image_0_tx`, `image_1_tx`, …
+sampler `value_tx`, VALUE_WIDTH texels a row, from texel MATERIAL_VALUES on, which is `pc_values` unless it is defined;
+images from `image_0_tx`, `image_1_tx`, …
 """
 
 from __future__ import annotations
@@ -35,9 +36,13 @@ GLSL_TYPES = {FLOAT: "float", VECTOR: "vec3", COLOR: "vec3", SHADER: "MaterialSu
 DEFINES = (("TABLE_SIZE", str(TABLE_SIZE)),)
 
 _FIELD = re.compile(r"\bpoint\.(\w+)")
-_FETCH = f"""vec4 value_fetch(int texel)
+_FETCH = f"""#ifndef MATERIAL_VALUES
+#define MATERIAL_VALUES pc_values
+#endif
+
+vec4 value_fetch(int texel)
 {{
-  int at = pc_values + texel;
+  int at = MATERIAL_VALUES + texel;
   return texelFetch(value_tx, ivec2(at % {VALUE_WIDTH}, at / {VALUE_WIDTH}), 0);
 }}
 """

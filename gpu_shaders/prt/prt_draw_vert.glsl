@@ -1,9 +1,11 @@
 /* A baked object again, where the G-buffer has it: one light a vertex, or the vertices to mix for a pixel. */
+#include "frame/mesh_place_lib.glsl"
+
 void main()
 {
-  vec4 world = prt_draw.world_from_object * vec4(in_position, 1.0);
+  vec4 world = mesh_world(prt_draw.world_from_object, in_position);
   v_position = world.xyz;
-  gl_Position = prt_draw.clip_from_world * world;
+  gl_Position = mesh_clip(prt_draw.clip_from_world, world);
   int corner = gl_VertexID % 3;
 #ifdef GLOSSY
   v_triangle = ivec4(in_triangle, 0);
