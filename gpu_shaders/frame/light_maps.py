@@ -34,10 +34,11 @@ class MapTile:
     """
 
     owner: Hashable  # Light.key
-    light: int  # index into the light table
+    light: int  # the scene's light, -1 for none
     face: Face
     look: bytes = b""
     part: float = 1.0
+    lamp: int = -1  # index into the table of lamps: a light may stand in it several times
 
     @property
     def key(self) -> Hashable:

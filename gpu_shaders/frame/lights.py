@@ -72,6 +72,24 @@ def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.nda
     return center + light.radius * math.sin(_sine_squared_quantile(u[2])) * direction
 
 
+def emitter_points(light: Light, across: float, most: int) -> list[np.ndarray | None]:
+    """Points (3,) evenly over an area light, one for each ``across`` metres of both sides but at most ``most``.
+
+    One is its centre, and None.
+    """
+    half = half_size(light)
+    x, y = (max(math.ceil(2.0 * side / across), 1) for side in half)
+    while x * y > max(most, 1):
+        x, y = (x - 1, y) if x >= y else (x, y - 1)
+    if x * y == 1:
+        return [None]
+    center, axes = np.asarray(light.world_from_light, np.float64)[:3, 3], light_axes(light)
+    places = [((2 * i + 1) / x - 1, (2 * j + 1) / y - 1) for i in range(x) for j in range(y)]
+    if light.area_shape in ROUND:
+        places = [_concentric(*place) for place in places]
+    return [center + axes[:, 0] * (u * half[0]) + axes[:, 1] * (v * half[1]) for u, v in places]
+
+
 def _net_point(index: int, scramble: np.ndarray) -> tuple[float, float]:
     """Point ``index`` of a (0, 2)-sequence, Sobol's first two dimensions, with digits flipped by ``scramble`` (0..1).
 

@@ -29,7 +29,7 @@ class ReflectiveShadowMaps(LightMaps):
     watts, and how much it counts where texels are chosen by strength (RGBA32F); incident flux times specular
     reflectance, and its lobe (RGBA32F, lobe_lib.glsl).
 
-    All maps are drawn from the emitter's centre; a sized light's bounce is that of a point with its power.
+    Maps are drawn from the emitter's centre: a sized light's bounce is that of a point with its power, or of a few.
     """
 
     shows_materials = True
@@ -85,16 +85,28 @@ class ReflectiveShadowMaps(LightMaps):
         rows = []
         largest = max([1.0, *(light.map_scale for light in gpu_scene.scene.lights if light.bounce > 0.0)])
         parts = self._parts(gpu_scene)
+        points = self._emitter_points(gpu_scene, parts)
         for index, light in enumerate(gpu_scene.scene.lights):
-            faces = light_faces(light, gpu_scene.boxes) if light.bounce > 0.0 else ()
-            row = light_row(light, None, len(tiles), len(faces))
-            row["intensity"] = row["intensity"] * light.bounce
-            part = parts[index] * light.map_scale / largest
-            look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
-            rows.append(row)
-            tiles += [MapTile(light.key, index, face, look, part) for face in faces]
+            own = points[index] if light.bounce > 0.0 else ()
+            # Several points share what one would have: about as many texels in all.
+            part = parts[index] * light.map_scale / largest / (1 if len(own) <= 1 else 2)
+            for number, point in enumerate(own):
+                faces = light_faces(light, gpu_scene.boxes, point)
+                row = light_row(light, None, len(tiles), len(faces))
+                row["intensity"] = row["intensity"] * (light.bounce / len(own))
+                row["position"] = row["position"] if point is None else point
+                look = LIGHT.pack([{**row, **_PLACE}]).tobytes()
+                owner = light.key if len(own) == 1 else (light.key, number)
+                tiles += [MapTile(owner, index, face, look, part, len(rows)) for face in faces]
+                rows.append(row)
         self.lay_out((*tiles, *self._other_tiles(gpu_scene)), int(resolution * largest))
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+
+    def _emitter_points(self, gpu_scene: GpuScene, parts: Sequence[float]) -> Sequence[Sequence[np.ndarray | None]]:
+        """For each light the points of its emitter that maps are drawn from, each for its part of the light; None is
+        the centre. ``parts``: of their tiles' widths that the lights have.
+        """
+        return [(None,)] * len(gpu_scene.scene.lights)
 
     def _parts(self, gpu_scene: GpuScene) -> Sequence[float]:
         """What part of its tiles' width each light is drawn in."""
@@ -121,7 +133,7 @@ class ReflectiveShadowMaps(LightMaps):
             lets_pass=gpu_scene.lets_lamps_pass,
             light_tx=self.light_table,
             pc_clip_from_world=tile.face.clip_from_world,
-            pc_light=tile.light,
+            pc_light=tile.lamp,
             pc_perspective=int(tile.face.perspective),
             pc_far=tile.face.far,
             pc_texel_measure=tile.face.texel_measure / viewport[2] ** 2,

@@ -15,10 +15,12 @@ import numpy as np
 from ...device.interface import Device, Texture
 from ...scene.data import LightKind
 from ..frame.light_maps import MapTile
+from ..frame.lights import emitter_points
 from ..frame.maps import Face
 from ..frame.reflective_maps import ReflectiveShadowMaps
 from ..frame.surface_points import SurfacePoints
 from ..frame.tables import replace_table
+from ..frame.voxel_grids import grid_bounds
 from .shaders import SKY
 from .structs import TILE
 
@@ -34,6 +36,8 @@ SKY_DISTANCE = 1e3
 POINTS_SIDE = 64
 # Part of its tiles' width that a light gets whose power is at least such a share of the strongest one's.
 PARTS = ((1.0, 1 / 16), (0.5, 1 / 256), (0.25, 0.0))
+# An area light has a point for each such part of the scene's diagonal, up to so many, and all lights together so many.
+EMITTER_PART, MOST_EMITTER_POINTS, MOST_POINTS = 1 / 8, 9, 32
 EMITTERS, CACHE, SKY_PATCHES = "emitters", "cache", "sky"  # owners of the tiles that are no light's
 
 # The face of a tile that is no picture: it "sees" every box, so that whatever moves makes it be drawn again.
@@ -98,7 +102,7 @@ class Sources(ReflectiveShadowMaps):
         for index, tile in enumerate(self.tiles):
             first = firsts.setdefault(tile.owner, index)
             origin = self.viewport(tile)[:2]
-            rows.append({"origin": origin, "light": tile.light, "first": first, "owned": counts[tile.owner]})
+            rows.append({"origin": origin, "light": tile.lamp, "first": first, "owned": counts[tile.owner]})
         self.tile_table = replace_table(self.device, TILE.pack(rows), self.tile_table)
 
     def _parts(self, gpu_scene: GpuScene) -> Sequence[float]:
@@ -111,6 +115,18 @@ class Sources(ReflectiveShadowMaps):
         ]
         strongest = max([*power, 1e-30])
         return [next((part for part, share in PARTS if p >= share * strongest), PARTS[-1][0]) for p in power]
+
+    def _emitter_points(self, gpu_scene: GpuScene, parts: Sequence[float]) -> Sequence[Sequence[np.ndarray | None]]:
+        """Strong area lights that are wide in the scene send from several points: what is near is lit by all of it."""
+        low, high = grid_bounds(gpu_scene.boxes)
+        across = EMITTER_PART * float(np.linalg.norm(high - low))
+        lights = gpu_scene.scene.lights
+        wide = sum(light.kind is LightKind.AREA and part == 1.0 for light, part in zip(lights, parts, strict=True))
+        most = min(MOST_EMITTER_POINTS, MOST_POINTS // max(wide, 1))
+        return [
+            emitter_points(light, across, most) if light.kind is LightKind.AREA and part == 1.0 else (None,)
+            for light, part in zip(lights, parts, strict=True)
+        ]
 
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:
         tiles = []

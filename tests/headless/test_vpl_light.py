@@ -269,3 +269,25 @@ def test_error_against_an_exact_gather_halves_with_four_times_the_samples(studio
     open_view = 0.5 * form_factor(points, (-1, 0, 0), *PATCH)
     assert expected.mean() < 0.9 * open_view.mean()  # the shield matters
     assert errors[1] < 0.65 * errors[0] and errors[2] < 0.65 * errors[1]
+
+
+# --- wide lights -----------------------------------------------------------------------------------------------------
+
+
+def test_a_wide_lights_bounce_is_that_of_its_parts(studio):
+    """A window as wide as its wall: sent from its centre alone, its bounce is up to 18 % wrong beside it."""
+    side, parts = 1.6, 6
+    beside = ortho(16, 16, 1.8, (0, 0, 0), (1, 0, 0), up=(0, 0, 1))
+
+    def lamp(x, z, size, power, key):
+        return light("AREA", (x, 0.9, z), (x, 0.0, z), power, key, area_size=(size, size))
+
+    def bounce(lights):
+        found, _ = gathered(studio, still([room()], lights), beside, 32, vpl_bounces="ONE")
+        return found.reshape(4, 4, 4, 4).mean((1, 3))
+
+    steps = side * ((np.arange(parts) + 0.5) / parts - 0.5)
+    each = side / parts, 100.0 / parts**2
+    wanted = bounce([lamp(x, z, *each, f"{x} {z}") for x in steps for z in steps])
+    wide = bounce([lamp(0.0, 0.0, side, 100.0, "wide")])
+    np.testing.assert_allclose(wide, wanted, rtol=0.1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rebound.gpu_shaders.frame.light_maps import LightMaps, MapTile
-from rebound.gpu_shaders.frame.lights import emitter_sample
+from rebound.gpu_shaders.frame.lights import emitter_points, emitter_sample
 from rebound.gpu_shaders.frame.maps import CASCADE_STEP, Atlas, light_faces, light_frame
 from rebound.tests.support.render_scenes import light
 
@@ -320,3 +320,17 @@ def test_samples_of_a_sun_agree_on_the_number_of_faces():
     sun = light("SUN", (0, 0, 0), (0.3, 0.2, -1), angle=40 * DEGREES)
     counts = {len(light_faces(sun, boxes, emitter_sample(sun, i, np.zeros(3)))) for i in range(64)}
     assert counts == {len(light_faces(sun, boxes))}
+
+
+def test_points_of_an_area_light_lie_evenly_on_it():
+    def points(most, **fields):
+        found = emitter_points(light("AREA", (1, 2, 3), (1, 2, 0), area_size=(4.0, 1.9), **fields), 1.0, most)
+        return [None] if found[0] is None else np.array(found) - (1, 2, 3)
+
+    sizes = [len(points(most, area_shape="RECTANGLE")) for most in (9, 6, 0)]
+    assert sizes == [8, 6, 1]
+    rectangle = points(9, area_shape="RECTANGLE")
+    np.testing.assert_allclose(rectangle.mean(0), 0.0, atol=1e-12)
+    assert sorted(set(np.abs(rectangle[:, :2]).ravel().round(6))) == [0.475, 0.5, 1.5]
+    ellipse = points(9, area_shape="ELLIPSE")
+    assert len(ellipse) == 8 and ((ellipse[:, :2] / (2.0, 0.95)) ** 2).sum(1).max() < 1.0
