@@ -20,11 +20,11 @@ import numpy as np
 from .bake.job import BakeSettings, Kind
 from .bake.process import BakeProcess, Outcome
 from .bake.surfaces import mesh_vertices
+from .bake_settings import BAKE_SETTINGS
 from .scene.changes import world_bounds
 from .scene.convert import convert_scene, is_own_surface
 from .scene.data import BakeState, Instance, Scene
 from .scene.errors import SceneError
-from .settings import BAKE_SETTINGS
 
 LOGGER = logging.getLogger("rebound")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import bpy
 
+from ..bake_settings import BAKE_SETTINGS
 from ..baking import TransferBake, bake, settings_of, surfaces
 from ..scene.errors import SceneError
-from ..settings import BAKE_SETTINGS
 
 LOGGER = logging.getLogger("rebound")
 DONE, FAILED, CANCELLED = 0, 1, 2

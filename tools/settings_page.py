@@ -9,10 +9,10 @@ from collections.abc import Iterable
 
 from environments import ROOT
 
+from rebound.bake_settings import BAKE_SETTINGS
 from rebound.gpu_shaders import TECHNIQUES
 from rebound.gpu_shaders.technique import Item, Setting, Value
 from rebound.settings import (
-    BAKE_SETTINGS,
     DISPLAY_SETTINGS,
     LIGHT_SETTINGS,
     OBJECT_SETTINGS,

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 
 import bpy
 
+from ..bake_settings import BAKE_SETTINGS
 from ..gpu_shaders.technique import Setting, Value
 from ..settings import (
-    BAKE_SETTINGS,
     DISPLAY_SETTINGS,
     LIGHT_SETTINGS,
     OBJECT_SETTINGS,

@@ -7,9 +7,10 @@ from pathlib import Path
 import bpy
 
 from ..bake.file import BakeFileError, read_about
+from ..bake_settings import BAKE_SETTINGS
 from ..baking import facts, has_bake, state_of, surfaces
 from ..session import SESSIONS
-from ..settings import BAKE_SETTINGS, named_settings
+from ..settings import named_settings
 from .rebound_panel import ReboundPanel, draw_settings
 
 # Rows that a basis has nothing to do with.

@@ -3,8 +3,8 @@
 import bpy
 import pytest
 
+from rebound.bake_settings import BAKE_SETTINGS
 from rebound.settings import (
-    BAKE_SETTINGS,
     DISPLAY_SETTINGS,
     LIGHT_SETTINGS,
     OBJECT_SETTINGS,

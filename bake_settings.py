@@ -1,0 +1,115 @@
+"""Settings of the operator that bakes light transfer (scene.rebound): no picture depends on them.
+
+Named as the fields of bake.job.BakeSettings, with "bake_" before them.
+"""
+
+from __future__ import annotations
+
+from .gpu_shaders.technique import Item, Setting
+
+BAKE_SETTINGS = (
+    Setting(
+        "bake_kind",
+        "ENUM",
+        "Basis",
+        "What is baked of each object: which light of the surroundings it can tell apart, and what it shows of it",
+        "DIFFUSE",
+        items=(
+            Item("DIFFUSE", "Soft, Diffuse", "Spherical harmonics of what matt surfaces receive, bounces included"),
+            Item(
+                "GLOSSY",
+                "Soft, Glossy",
+                "Spherical harmonics of what arrives from every direction: reflections too. A matrix a vertex, "
+                "compressed; slower to bake",
+            ),
+            Item("WAVELET", "Sharp, Diffuse", "Haar wavelets: sharp shadows of small bright parts of the sky"),
+        ),
+    ),
+    Setting(
+        "bake_bands",
+        "INT",
+        "Bands",
+        "Detail of the light that is told apart, as orders of spherical harmonics; their square is the number of "
+        "terms. Higher makes shadows less soft, at the cost of time and memory; lower is quicker",
+        5,
+        minimum=2,
+        maximum=6,
+        unit="bands",
+    ),
+    Setting(
+        "bake_result_bands",
+        "INT",
+        "Reflected Bands",
+        "Glossy: detail of what surfaces reflect. Higher makes reflections less soft, at the cost of time and memory; "
+        "lower is quicker",
+        5,
+        minimum=2,
+        maximum=6,
+        unit="bands",
+    ),
+    Setting(
+        "bake_directions",
+        "INT",
+        "Directions",
+        "Rays from each vertex. More finds finer shadows with less error, at the cost of time in proportion",
+        1024,
+        minimum=16,
+        maximum=65536,
+        unit="rays a vertex",
+    ),
+    Setting(
+        "bake_shadows", "BOOL", "Shadows", "Whether surfaces block light. Off bakes in no time, without bounces", True
+    ),
+    Setting(
+        "bake_bounces",
+        "INT",
+        "Bounces",
+        "How often light goes on by way of other surfaces. More is brighter and truer in corners, at the cost of time; "
+        "at 0 there are shadows only",
+        1,
+        minimum=0,
+        maximum=16,
+        unit="bounces",
+    ),
+    Setting(
+        "bake_error",
+        "FLOAT",
+        "Error",
+        "Glossy: how far compressed matrices may be off, as a part of their mean length. Higher takes less memory, "
+        "lower is truer at the cost of memory",
+        0.01,
+        minimum=0.0,
+        maximum=1.0,
+        unit="parts of the length",
+        soft_maximum=0.1,
+    ),
+    Setting(
+        "bake_texels",
+        "ENUM",
+        "Cube Map",
+        "Wavelets: how finely the light of the surroundings is told apart",
+        "32",
+        items=(
+            Item("32", "6 x 32²", "Shadows 3 degrees sharp"),
+            Item("64", "6 x 64²", "Shadows 1.5 degrees sharp, four times the time and memory of bakes"),
+        ),
+    ),
+    Setting(
+        "bake_keep",
+        "FLOAT",
+        "Kept Energy",
+        "Wavelets: which part of each vertex' transfer is kept. Higher is truer at the cost of memory; lower leaves "
+        "the smallest terms out",
+        0.999,
+        minimum=0.5,
+        maximum=1.0,
+        unit="parts of the squared sum",
+    ),
+    Setting(
+        "bake_pack",
+        "BOOL",
+        "Pack",
+        "Keep bakes in the .blend. Off writes a file for each object into a folder beside the .blend",
+        False,
+    ),
+)
