@@ -30,8 +30,8 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   int index = light.first_face;
   MapFace face = direct_face;
 #else
-  int index = light_map_face(light, face_tx, P);
-  MapFace face = map_face_fetch(face_tx, index);
+  int index;
+  MapFace face = light_map_face(light, face_tx, P, index);
 #endif
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
   bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;

@@ -87,31 +87,34 @@ Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
   return receiver;
 }
 
-/* Visibility by those of the nine texels around the receiver's own that tell something; lit if none does. */
-float shadow_around(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver)
+/* Visibility by `taps` texels within `width`, from noise. Where none of them tells anything (a wall's top edge would be lit
+ * from beyond the ceiling that rests on it), the nine around the receiver's own answer for them; lit if they do not. */
+float shadow_mean(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, int taps, vec2 width,
+                  vec2 noise)
 {
   float lit = 0.0;
   float telling = 0.0;
-  for (int i = 0; i < 9; i++) {
-    vec2 aside = vec2(i % 3 - 1, i / 3 - 1) / face.tile;
+  int end = taps;
+  int i = 0;
+  do {
+    int around = i - taps;
+    vec2 aside = around >= 0 ? vec2(around % 3 - 1, around / 3 - 1) / face.tile
+                 : taps == 1 ? (noise - 0.5) / face.tile
+                             : width * sampling_vogel_disc(i, SHADOW_TAPS, noise.y);
     int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
     telling += state == SHADOW_MISSED ? 0.0 : 1.0;
     lit += state == SHADOW_LIT ? 1.0 : 0.0;
-  }
+    i++;
+    end = i == taps && telling == 0.0 ? taps + 9 : end;
+  } while (i < end);
   return telling > 0.0 ? lit / telling : 1.0;
 }
 
-/* Visibility from one map position: one texel's width of softness, from noise over the samples. Where a texel tells
- * nothing (a wall's top edge would be lit from beyond the ceiling that rests on it), those around answer for it. */
+/* Visibility from one map position: one texel's width of softness, from noise over the samples. */
 float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
-  vec2 aside = (noise - 0.5) / face.tile;
-  int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
-  if (state == SHADOW_MISSED) {
-    return shadow_around(face, depth_tx, slope_tx, receiver);
-  }
-  return state == SHADOW_BLOCKED ? 0.0 : 1.0;
+  return shadow_mean(face, depth_tx, slope_tx, receiver, 1, vec2(0.0), noise);
 }
 
 /* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter
@@ -133,19 +136,8 @@ float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
       blockers += 1.0;
     }
   }
-  if (blockers == 0.0) {
-    return shadow_hard(face, depth_tx, slope_tx, P, geometric, noise);
-  }
-  float apart = blocker / blockers - receiver.closeness;
+  float apart = blocker / max(blockers, 1.0) - receiver.closeness;
   vec2 width = per_metre * (face.perspective != 0 ? apart / face.far : apart * face.far);
   width = clamp(width, vec2(0.5 / face.tile), vec2(SHADOW_WIDEST_SEARCH));
-  float lit = 0.0;
-  float telling = 0.0;
-  for (int i = 0; i < SHADOW_TAPS; i++) {
-    vec2 uv = receiver.uv + width * sampling_vogel_disc(i, SHADOW_TAPS, noise.y);
-    int state = shadow_tap(face, depth_tx, slope_tx, receiver, uv).state;
-    telling += state == SHADOW_MISSED ? 0.0 : 1.0;
-    lit += state == SHADOW_LIT ? 1.0 : 0.0;
-  }
-  return telling > 0.0 ? lit / telling : shadow_around(face, depth_tx, slope_tx, receiver);
+  return shadow_mean(face, depth_tx, slope_tx, receiver, blockers > 0.0 ? SHADOW_TAPS : 1, width, noise);
 }

@@ -97,8 +97,7 @@ void main()
     if (light.face_count == 0) {
       continue;
     }
-    g.face = light_map_face(light, rsm_face_tx, g.P);
-    MapFace face = map_face_fetch(rsm_face_tx, g.face);
+    MapFace face = light_map_face(light, rsm_face_tx, g.P, g.face);
     g.tile = face.tile;
     vec3 p = map_position(face, g.P);
     p.z = max(p.z, face.near);

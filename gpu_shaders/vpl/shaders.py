@@ -152,7 +152,7 @@ def _gather(name: str, *defines: tuple[str, str]) -> Shader:
 
 def _gather_to_reuse(glossy: bool, first_hand: bool) -> Shader:
     name, defines = _with_defines("vpl_gather_to_reuse", glossy, first_hand)
-    return _gather(name, _REUSE, *defines)
+    return _gather(name, _REUSE, *defines, *(() if first_hand else (("LAMPS_ONLY", "1"),)))
 
 
 # By whether anything in the scene is glossy.

@@ -2,7 +2,7 @@
  * with the receiver's cosine found, chosen for its nearness alone. Each is weighted by the balance heuristic (Veach &
  * Guibas 1995) of both, so that neither touching surfaces nor small bright patches make noise, and no clamp is needed.
  *
- * Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of
+ * LAMPS_ONLY leaves out what looks for emitters and the sky. Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of
  * vpl/structs.py. */
 #include "frame/light_map_lib.glsl"
 #include "lib/sampling_lib.glsl"
@@ -57,8 +57,7 @@ int candidates_lamp(float u, out float share)
 Vpl candidates_seen(vec3 hit, vec3 direction, int tile_index, out int seen_tile)
 {
   Light light = light_fetch(light_tx, int(vpl_tile_fetch(tile_tx, tile_index).light));
-  seen_tile = light_map_face(light, face_tx, hit); /* tiles and faces have one order */
-  MapFace face = map_face_fetch(face_tx, seen_tile);
+  MapFace face = light_map_face(light, face_tx, hit, seen_tile); /* tiles and faces have one order */
   vec3 p = map_position(face, hit);
   if (!map_holds(face, p)) {
     return VPL_NONE;
@@ -278,15 +277,20 @@ Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 origin, ivec2 p
   Vpl seen = VPL_NONE;
   if (far >= 0.0) {
     vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
+#ifndef LAMPS_ONLY
     emitted = candidates_emitted(P, N, hit, direction);
+#endif
     int tile = (kinds >> SOURCE_BOUNCE & 1) != 0 ? candidates_lamp(choice.x, share) : -1;
     if (tile >= 0) {
       seen = candidates_seen(hit, direction, tile, seen_tile);
     }
-  } else if (dot(direction, geometric) > 0.0 && vpl_frame.sky.z > 0.0 && (kinds >> SOURCE_SKY & 1) != 0) {
+  }
+#ifndef LAMPS_ONLY
+  else if (dot(direction, geometric) > 0.0 && vpl_frame.sky.z > 0.0 && (kinds >> SOURCE_SKY & 1) != 0) {
     seen = candidates_sky(direction);
     seen_tile = vpl_frame.sky_tile;
   }
+#endif
   float form = vpl_form(seen.position, seen.area, seen.normal, P, N);
   vec3 toward = vpl_flux_toward(seen.flux, seen.specular, seen.normal, -direction);
   float target = vpl_strength(toward) * form;
