@@ -325,7 +325,7 @@ def test_samples_of_a_sun_agree_on_the_number_of_faces():
 def test_points_of_an_area_light_lie_evenly_on_it():
     def points(most, **fields):
         found = emitter_points(light("AREA", (1, 2, 3), (1, 2, 0), area_size=(4.0, 1.9), **fields), 1.0, most)
-        return [None] if found[0] is None else np.array(found) - (1, 2, 3)
+        return np.array([(1, 2, 3) if point is None else point for point in found]) - (1, 2, 3)
 
     sizes = [len(points(most, area_shape="RECTANGLE")) for most in (9, 6, 0)]
     assert sizes == [8, 6, 1]
