@@ -4,6 +4,7 @@ import time
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 from rebound.benchmarks.pictures import diffuse, read_passes
@@ -24,7 +25,7 @@ def render_shared(registered, shared_dir, tmp_path):
             setattr(scene.rebound, key, value)
         layer = scene.view_layers[0]
         layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = layer.use_pass_diffuse_color = True
-        layer.use_pass_glossy_direct = layer.use_pass_glossy_color = True
+        layer.use_pass_glossy_direct = layer.use_pass_glossy_indirect = layer.use_pass_glossy_color = True
         render(scene, tmp_path / f"{name}.exr")
         truth = read_passes(Path(shared_dir) / "references" / f"{name}.{reference}.exr")
         return truth, read_passes(tmp_path / f"{name}.exr")
@@ -123,3 +124,21 @@ def test_metals_and_plastic_match_the_path_tracer(render_shared):
         level, error = show(f"glossy_metals, {name}", truth[name], test[name])
         assert 0.99 <= level <= 1.01
         assert error <= 0.01
+
+
+def isolated(image) -> int:
+    """Pixels that are four times as bright as all but three of the 24 around them, and of some brightness at all."""
+    gray = np.pad(image.mean(-1), 2, mode="edge")
+    around = np.sort(np.lib.stride_tricks.sliding_window_view(gray, (5, 5)).reshape(*image.shape[:2], 25))
+    return int((image.mean(-1) > 4.0 * around[..., -4] + 0.05 * image.mean()).sum())
+
+
+@pytest.mark.slow
+def test_metals_under_bounced_light_match_and_have_no_fireflies(render_shared):
+    """No clamp stands behind it: there is none."""
+    truth, test = render_shared("glossy_metals", "one_bounce", samples=16, method="VPL", vpl_bounces="ONE")
+    level, error = show("glossy_metals, Combined", truth["Combined"][..., :3], test["Combined"][..., :3])
+    assert 0.97 <= level <= 1.03
+    assert error <= 0.02
+    bounced = [test[f"{kind} Indirect"] * test[f"{kind} Color"] for kind in ("Diffuse", "Glossy")]
+    assert bounced[1].max() > 1.0 and [isolated(light) for light in bounced] == [0, 0]
