@@ -25,11 +25,13 @@ vec3 mesh_normal(float stored)
   return bits == 0u ? vec3(0.0) : octahedron_decode(vec2(numbers) / 16383.0 - 1.0);
 }
 
-/* A third of a number, rounded down: where integers are divided one by one, as in software, it is half of the work. */
+/* A third of a number, rounded down: where integers are divided one by one, as in software, it is half of the work. Beyond
+ * 2^24 a float is some numbers off, which the second line mends: 10923 is half a third of 65536, so that what is below a
+ * multiple of 3 and what is above go the right way. */
 int mesh_third(int number)
 {
   int third = int(float(number) * (1.0 / 3.0));
-  return third + (((number - 3 * third) * 21846) >> 16);
+  return third + (((number - 3 * third) * 21846 + 10923) >> 16);
 }
 
 MeshCorner mesh_corner()

@@ -1,17 +1,20 @@
 """Meshes on pages and draws put together: few calls, the same picture, and edits that upload one mesh."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rebound.device.interface import DrawState
+from rebound.device.source import SHADER_ROOT
 from rebound.gpu_shaders.frame import batches, mesh_pages
 from rebound.gpu_shaders.frame.draws import draw_scene, visible_draws
 from rebound.gpu_shaders.frame.mesh_pages import MOST_SMALL, pack_normals
 from rebound.gpu_shaders.frame.shaders import GBUFFER
 from rebound.gpu_shaders.prt.shaders import DRAW, PRT_DRAW
 from rebound.scene.data import Instance, Material, Visibility
+from rebound.tests.support.glsl_functions import evaluate
 from rebound.tests.support.render_scenes import (
     EVERYTHING,
     Studio,
@@ -123,6 +126,22 @@ def test_what_moved_is_not_put_together_anew(studio, monkeypatch):
     studio.gpu_scene.uploads.clear()
     studio.render(replace(shown, instances=instances), VIEW)
     assert dict(studio.gpu_scene.uploads) == {"instances": 1}
+
+
+def test_thirds_are_exact_however_long_a_call_is(headless_device):
+    """A call's corners run to its chunks times 48: a few large meshes on one page are beyond what floats hold."""
+    function = re.search(r"int mesh_third\(.*?\n}\n", (SHADER_ROOT / "frame/mesh_lib.glsl").read_text(), re.DOTALL)
+    numbers = np.concatenate([[0, 1 << 24, 1 << 25, 3 << 24, 1 << 28], [(1 << 31) - 4001]])[:, None] + np.arange(4000)
+    numbers = numbers.ravel()
+    third = "mesh_third(int(k.x) * 4096 + int(k.y))"
+    found = evaluate(
+        headless_device,
+        ["test/third.glsl"],
+        f"vec4({third} >> 12, {third} & 4095, 0.0, 0.0)",
+        {"k": np.stack([numbers >> 12, numbers & 4095], 1)},
+        files={"test/third.glsl": function[0]},
+    )
+    np.testing.assert_array_equal(found[:, 0] * 4096 + found[:, 1], numbers // 3)
 
 
 def test_packed_normals_are_exact_along_axes_and_close_elsewhere(studio):
