@@ -255,9 +255,8 @@ class Rsm:
     def _disc_passes(self, atlas: Atlas, inputs: FrameInputs, settings: Mapping[str, Value], texels: int) -> Passes:
         """The same for about ``texels`` gathers a pixel."""
         published = settings["estimator"] == "DISC_PUBLISHED"
-        lights = len(inputs.gpu_scene.scene.lights)
-        bouncing = sum(light.bounce > 0.0 for light in inputs.gpu_scene.scene.lights)
-        gathers = max(int(settings["gathers"]) // bouncing, LEAST_GATHERS_A_LIGHT)
+        lights = sum(light.bounce > 0.0 for light in inputs.gpu_scene.scene.lights)  # the table has no others
+        gathers = max(int(settings["gathers"]) // lights, LEAST_GATHERS_A_LIGHT)
         shared = {
             "light_tx": self.maps.light_table,
             "rsm_face_tx": self.maps.face_table,

@@ -94,9 +94,6 @@ void main()
   vec3 sum = vec3(0.0);
   for (int i = pc_first_light; i < pc_last_light; i++) {
     Light light = light_fetch(light_tx, i);
-    if (light.face_count == 0) {
-      continue;
-    }
     MapFace face = light_map_face(light, rsm_face_tx, g.P, g.face);
     g.tile = face.tile;
     vec3 p = map_position(face, g.P);

@@ -69,6 +69,23 @@ def test_excluded_light_gives_no_bounce_and_draws_no_map(studio, method):
     assert other["diffuse_indirect"].mean() == pytest.approx(one["diffuse_indirect"].mean(), rel=1e-4)
 
 
+@pytest.mark.parametrize("estimator", ["DISC_EXACT", "DISC_PUBLISHED"])
+def test_discs_ask_the_lights_that_bounce_and_no_others(studio, estimator, monkeypatch):
+    asked = []
+    fullscreen = studio.device.fullscreen
+
+    def counted(shader, target, **given):
+        asked.extend(range(given.get("pc_first_light", 0), given.get("pc_last_light", 0)))
+        fullscreen(shader, target, **given)
+
+    monkeypatch.setattr(studio.device, "fullscreen", counted)
+    settings = {"method": "RSM", "rsm_estimator": estimator}
+    lamps = [replace(KEY, bounce=0.0), FILL]
+    found, alone = (studio.render(still(MESHES, some), VIEW, 1, PASSES, **settings) for some in (lamps, lamps[1:]))
+    assert asked == [0, 0]  # rows of the table of lights, which has no others
+    np.testing.assert_array_equal(found["diffuse_indirect"], alone["diffuse_indirect"])
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_object_that_receives_none_has_none_and_others_all(studio, method):
     """The floor and the wall around the block lose nothing."""
