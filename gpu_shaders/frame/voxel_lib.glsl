@@ -109,13 +109,14 @@ float voxel_trace(vec3 origin, vec3 direction, float reach)
   vec3 inverse = 1.0 / slope;
   float way = 0.0;
   float met = -1.0;
+  int outer = voxel_grid.outer_count;
   int grid = 0;
   do {
     float found = voxel_trace_grid(voxel_place(grid), origin, slope, inverse, reach, way);
     met = found >= 0.0 ? found : met;
     reach = found >= 0.0 ? found : reach;
     grid++;
-  } while (grid <= voxel_grid.outer_count && way < reach);
+  } while (grid <= outer && way < reach);
   return met;
 }
 
@@ -129,8 +130,10 @@ bool voxel_clear(vec3 start, vec3 end)
 /* The finest grid that holds P, or the widest. */
 VoxelPlace voxel_place_at(vec3 P)
 {
+  /* Lavapipe crashes where a block or texture is first read in a loop that only some pixels of a group go through. */
+  int outer = voxel_grid.outer_count;
   int grid = 0;
-  while (grid < voxel_grid.outer_count && !voxel_place_holds(voxel_place(grid), P)) {
+  while (grid < outer && !voxel_place_holds(voxel_place(grid), P)) {
     grid++;
   }
   return voxel_place(grid);

@@ -170,21 +170,20 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction)
   int level;
   vec4 cube = candidates_cube(hit, level);
   vec3 place = index_place(cube, hit);
-  for (int axis = 0; axis < 3 && vpl_frame.emitters.z > 0.0; axis++) {
+  float edge = voxel_edge_at(hit);
+  ivec2 answer = ivec2(-1);
+  for (int axis = 0; axis < 3; axis++) {
     int point = index_point(emitter_index_tx, level, place, index_side(axis, -direction[axis]));
-    if (point < 0) {
-      continue;
-    }
-    ivec2 texel = index_atlas_texel(vpl_frame.emitters, point);
+    ivec2 texel = index_atlas_texel(vpl_frame.emitters, max(point, 0));
     vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
-    vec3 apart = hit - texelFetch(position_area_tx, texel, 0).xyz;
-    float area = texelFetch(position_area_tx, texel, 0).w;
-    if (dot(n, direction) < 0.0 && abs(dot(apart, n)) < CANDIDATES_VOXELS * voxel_edge_at(hit) &&
-        length(apart) < CANDIDATES_CELLS / cube.w + CANDIDATES_SPACING * sqrt(area)) {
-      return texel;
-    }
+    vec4 at = texelFetch(position_area_tx, texel, 0);
+    vec3 apart = hit - at.xyz;
+    bool near = abs(dot(apart, n)) < CANDIDATES_VOXELS * edge &&
+                length(apart) < CANDIDATES_CELLS / cube.w + CANDIDATES_SPACING * sqrt(at.w);
+    bool answers = point >= 0 && vpl_frame.emitters.z > 0.0 && dot(n, direction) < 0.0 && near;
+    answer = answers && answer.x < 0 ? texel : answer;
   }
-  return ivec2(-1);
+  return answer;
 }
 
 /* Irradiance / pi from the emitter that a ray from P along `direction` hit at `hit`, weighted against what the pool finds

@@ -28,7 +28,8 @@ def build(scene) -> None:
     light = bpy.data.objects["Light"].data
     light.type, light.energy = "SPOT", 3000
     bpy.data.objects["Light"].rotation_euler = (0.65, 0.05, 1.85)
-    bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1))
+    # So wide that grids of voxels lie around one another: lavapipe is easily crashed by them.
+    bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
     floor = bpy.data.materials.new("Floor")
     if bpy.app.version < (5, 0):
         floor.use_nodes = True
