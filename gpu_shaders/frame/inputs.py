@@ -31,10 +31,9 @@ class GBuffer:
 
     ``albedo`` RGBA16F: diffuse reflectance; a: 1 surface, 0 background, -1 holdout. ``emission`` RGBA32F radiance.
     ``position`` RGBA32F world position; w: 1 surface (plus bits of HAS_DEFINES), -1 one that takes no indirect light, 0
-    background. ``normal``
-    RGBA32F: shading normal and geometric normal, both octahedral and on the camera's side. ``specular`` RGBA16F:
-    specular reflectance at normal incidence (F0), black where the surface has no specular lobe; a: roughness, 0..1, the
-    square root of GGX's alpha.
+    background. ``normal`` RGBA32F: shading normal and geometric normal, both octahedral and on the camera's side.
+    ``specular`` RGBA16F: specular reflectance at normal incidence (F0), black where the surface has no specular lobe;
+    a: roughness, 0..1, the square root of GGX's alpha.
     ``passed`` RGBA16F, where the scene has anything that light passes: colour of what lies before that; a: the part of
     it that passed as if nothing was there, and not through glass.
     Where there is no surface only ``albedo`` and ``position`` hold something: zero.

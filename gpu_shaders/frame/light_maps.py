@@ -33,8 +33,8 @@ class MapTile:
     ``part`` of its tile's width is drawn, a power of 1/2.
     """
 
-    owner: Hashable  # Light.key
-    light: int  # the scene's light, -1 for none
+    owner: Hashable  # Light.key, or that and the number of a point of its emitter
+    light: int  # index of the scene's light, -1 for none
     face: Face
     look: bytes = b""
     part: float = 1.0

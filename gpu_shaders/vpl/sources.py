@@ -121,11 +121,11 @@ class Sources(ReflectiveShadowMaps):
         low, high = grid_bounds(gpu_scene.boxes)
         across = EMITTER_PART * float(np.linalg.norm(high - low))
         lights = gpu_scene.scene.lights
-        wide = sum(light.kind is LightKind.AREA and part == 1.0 for light, part in zip(lights, parts, strict=True))
-        most = min(MOST_EMITTER_POINTS, MOST_POINTS // max(wide, 1))
+        strong = [light.kind is LightKind.AREA and part == 1.0 for light, part in zip(lights, parts, strict=True)]
+        most = min(MOST_EMITTER_POINTS, MOST_POINTS // max(sum(strong), 1))
         return [
-            emitter_points(light, across, most) if light.kind is LightKind.AREA and part == 1.0 else (None,)
-            for light, part in zip(lights, parts, strict=True)
+            emitter_points(light, across, most) if is_strong else (None,)
+            for light, is_strong in zip(lights, strong, strict=True)
         ]
 
     def _other_tiles(self, gpu_scene: GpuScene) -> Sequence[MapTile]:

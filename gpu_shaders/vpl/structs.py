@@ -9,7 +9,7 @@ INDEX_LEVELS = 1 + MOST_OUTER_GRIDS
 TILE = Struct(
     "VplTile",
     origin="vec2",  # lower left texel in the atlas
-    light="int",  # index of the light whose tile it is, -1: of no light
+    light="int",  # row of the table of lamps, where a light may stand several times; -1: of no light
     first="int",  # first tile of the same owner
     owned="int",  # tiles of the same owner
 )

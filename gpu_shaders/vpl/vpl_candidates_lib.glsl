@@ -2,8 +2,8 @@
  * with the receiver's cosine found, chosen for its nearness alone. Each is weighted by the balance heuristic (Veach &
  * Guibas 1995) of both, so that neither touching surfaces nor small bright patches make noise, and no clamp is needed.
  *
- * LAMPS_ONLY leaves out what looks for emitters and the sky. Names of samplers and constants are those of `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of
- * vpl/structs.py. */
+ * LAMPS_ONLY leaves out what looks for emitters and the sky: software OpenGL skips no branch. Names of samplers are those of
+ * `_CANDIDATES` in vpl/shaders.py, the uniform block vpl_frame that of vpl/structs.py. */
 #include "frame/light_map_lib.glsl"
 #include "lib/sampling_lib.glsl"
 #include "vpl/vpl_form_lib.glsl"
@@ -228,9 +228,9 @@ vec3 candidates_bounced(vec3 origin, vec3 N, vec3 geometric, vec2 noise, vec3 ce
 }
 
 /* Fill a reservoir for the surface at P, whose rays begin at `origin` (voxel_start_seen), from lights of `kinds`, bits of
- * SourceKind. `visible`: the chosen one is known to be seen from it. `carried` and `emitted` are one ray's estimates of the irradiance / pi from the cache, and from emitters;
- * `from_sky` the part of `carried` that came from the sky. Receivers and their rounds, of the same sample, differ in
- * `pixel` or in `round`. */
+ * SourceKind. `visible`: the chosen one is known to be seen from it. `carried` and `emitted` are one ray's estimates of the
+ * irradiance / pi from the cache, and from emitters; `from_sky` the part of `carried` that came from the sky. Receivers and
+ * their rounds, of the same sample, differ in `pixel` or in `round`. */
 Reservoir candidates_choose(vec3 P, vec3 N, vec3 geometric, vec3 origin, ivec2 pixel, int round, int kinds,
                             out bool visible, out vec3 carried, out vec3 from_sky, out vec3 emitted)
 {

@@ -2,8 +2,8 @@
  * a mirror shows does not move with its surface: the sharper a lobe, the less counts what was seen from elsewhere. */
 #include "vpl/vpl_history_lib.glsl"
 
-/* The deviation of means of few samples, as a part of their level, at this roughness; it grows with the width of the lobe's highlight, so that
- * the filter mixes what wide lobes show, and leaves mirrors alone. */
+/* The deviation of means of few samples, as a part of their level, at this roughness; it grows with the width of the lobe's
+ * highlight, so that the filter mixes what wide lobes show, and leaves mirrors alone. */
 const float REFLECT_ROUGHNESS = 0.1;
 const float REFLECT_UNKNOWN = 1e4;
 /* Lobes of at least this roughness show the same from a little aside. */

@@ -13,7 +13,7 @@ void main()
   }
   vec4 normals = texelFetch(normal_tx, pixel, 0);
   vec3 N = octahedron_decode(normals.zw);
-  vec3 V = pc_eye.w > 0.5 ? normalize(pc_eye.xyz - position.xyz) : pc_eye.xyz;
+  vec3 V = math_toward(position.xyz, pc_eye);
   vec2 u = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed));
   /* A point of the unit sphere around the normal's tip lies in a cosine-weighted direction. */
   float z = 1.0 - 2.0 * u.x;
