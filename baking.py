@@ -147,8 +147,7 @@ def bake(
     """Bake Blender objects and wait for it; lines that warn of something. By default as the scene's settings say.
 
     ``blend`` is what the file will be saved as, where that is another name. ``each`` is called with the TransferBake
-    now and then. Raises SceneError, or OSError for files, and leaves all as
-    it was.
+    now and then. Raises SceneError, or OSError for files, and leaves all as it was.
     """
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
     group: Any = depsgraph.scene.rebound
@@ -206,7 +205,7 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
     if "device" in about:
-        lines.append(f"Baked on the {about['device']}")
+        lines.append(f"Rays traced by {about['device']}")
     if "rms" in about:
         lines.append(f"Error of compression {about['rms']:.2%}, worst vertex {about['worst']:.1%}")
     return [*lines, f"{nbytes / 1e6:.1f} MB"] if nbytes else lines

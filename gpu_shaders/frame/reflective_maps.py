@@ -88,7 +88,7 @@ class ReflectiveShadowMaps(LightMaps):
         points = self._emitter_points(gpu_scene, parts)
         for index, light in enumerate(gpu_scene.scene.lights):
             own = points[index] if light.bounce > 0.0 else ()
-            # Several points share what one would have: about as many texels in all.
+            # Half as wide: four points are drawn in as many texels as one. Their places in the atlas are whole tiles.
             part = parts[index] * light.map_scale / largest / (1 if len(own) <= 1 else 2)
             for number, point in enumerate(own):
                 faces = light_faces(light, gpu_scene.boxes, point)
