@@ -29,10 +29,12 @@ int index_point(sampler2D index_tx, int level, vec3 place, int side)
   return int(texelFetch(index_tx, index_texel(cell, side) + ivec2(0, level * INDEX_SIZE.y), 0).x) - 1;
 }
 
-/* Texel of a point of the tile whose lower left texel and side are `tile`. */
+/* Texel of a point of the tile whose lower left texel and side are `tile`. A side of 0, where there are no points, is asked
+ * too, by shaders that skip no branch: nothing may be divided by it. */
 ivec2 index_atlas_texel(vec3 tile, int point)
 {
-  return ivec2(tile.xy) + ivec2(point % int(tile.z), point / int(tile.z));
+  int side = max(int(tile.z), 1);
+  return ivec2(tile.xy) + ivec2(point % side, point / side);
 }
 
 vec3 index_radiance(sampler2D position_area_tx, sampler2D flux_tx, ivec2 texel)
