@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 SHADER_ROOT = Path(__file__).resolve().parent.parent / "gpu_shaders"
@@ -107,11 +108,13 @@ def _read(shader_name: str, stage: str, file: str, files: Mapping[str, str], ask
     return path.read_text(encoding="utf-8")
 
 
+@lru_cache(maxsize=512)  # the same libraries are in nearly every shader
 def strip_comments(text: str) -> str:
     """Replace comments by blanks, keeping the lines. (GLSL has no strings that could hold a comment sign.)"""
     return _COMMENT.sub(lambda m: "\n" * m[0].count("\n") or " ", text)
 
 
+@lru_cache(maxsize=512)
 def check(code: str) -> list[tuple[int, str]]:
     """Find declarations that belong in Python, in text without comments: (line, what is wrong) of each."""
     faults, plain = [], []

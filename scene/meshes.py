@@ -77,7 +77,7 @@ def read_mesh(mesh, key: Hashable, owner: str, wanted: tuple[str, ...] = ()) -> 
         uvs=_uvs(mesh, flat),
         active_uv=_active_uv(mesh),
         slots=_slot_ranges(triangle_slots[order]),
-        bounds=np.stack((points.min(axis=0), points.max(axis=0))),
+        bounds=_bounds(points),
         warnings=warnings,
         attributes=_attributes(mesh, flat, order, wanted),
         texture_space=np.stack((middle - half, middle + half)),
@@ -129,10 +129,16 @@ def _usable(points: Array) -> tuple[Array, int, Array]:
             normals[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
         length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
         longest = np.maximum(np.einsum("ij,ij->i", a, a), np.einsum("ij,ij->i", b, b))
-        finite = np.isfinite(points.sum(axis=(1, 2))) & np.isfinite(longest)
+        finite = np.isfinite(longest)  # not where any corner is not: what is subtracted from it is neither
         good = finite & (length > FLATNESS * longest)
         normals /= length[:, None]
     return good, int(len(points) - np.count_nonzero(finite)), normals
+
+
+def _bounds(points: Array) -> Array:
+    """(2, 3) lower and upper corner of (n, 3) points, column by column: along short rows numpy is 20 times as slow."""
+    columns = [points[:, k] for k in range(3)]
+    return np.array([[c.min() for c in columns], [c.max() for c in columns]], points.dtype)
 
 
 def _order_by_slot(slots: Array, good: Array) -> Array:

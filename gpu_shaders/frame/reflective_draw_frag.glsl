@@ -12,7 +12,7 @@ const float REFLECTIVE_GRAZING = 1e-2;
 
 void main()
 {
-  Light light = light_fetch(light_tx, pc_light);
+  Light light = reflected_light;
   vec3 to_light = light.kind == LIGHT_SUN ? light.axis_z : light.position - v_position;
   float distance_squared = light.kind == LIGHT_SUN ? 1.0 : max(dot(to_light, to_light), 1e-20);
   vec3 d = to_light * inversesqrt(max(dot(to_light, to_light), 1e-20));

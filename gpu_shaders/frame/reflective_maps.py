@@ -37,6 +37,7 @@ class ReflectiveShadowMaps(LightMaps):
     def __init__(self, device: Device) -> None:
         super().__init__(device, ["RGBA32F", "RGBA16F", "RGBA32F", "RGBA32F"])
         self.light_table: Texture | None = None
+        self._light_blocks = np.zeros((0, 0))  # its rows as uniform blocks, which fragments need not fetch
         self.pending = 0  # tiles that are known to be out of date
         self._laid_out: tuple[int, int] | None = None
 
@@ -101,6 +102,7 @@ class ReflectiveShadowMaps(LightMaps):
                 rows.append(row)
         self.lay_out((*tiles, *self._other_tiles(gpu_scene)), int(resolution * largest))
         self.light_table = replace_table(self.device, LIGHT.pack(rows), self.light_table)
+        self._light_blocks = LIGHT.pack(rows, for_uniform=True)
 
     def _emitter_points(self, gpu_scene: GpuScene, parts: Sequence[float]) -> Sequence[Sequence[np.ndarray | None]]:
         """For each light the points of its emitter that maps are drawn from, each for its part of the light; None is
@@ -131,9 +133,8 @@ class ReflectiveShadowMaps(LightMaps):
             draws,
             viewport,
             lets_pass=gpu_scene.lets_lamps_pass,
-            light_tx=self.light_table,
+            reflected_light=self._light_blocks[tile.lamp],
             pc_clip_from_world=tile.face.clip_from_world,
-            pc_light=tile.lamp,
             pc_perspective=int(tile.face.perspective),
             pc_far=tile.face.far,
             pc_texel_measure=tile.face.texel_measure / viewport[2] ** 2,

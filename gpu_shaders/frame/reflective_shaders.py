@@ -24,12 +24,12 @@ REFLECT = Shader(
     fragment="frame/reflective_draw_frag.glsl",
     varyings=SURFACE_VARYINGS,
     outputs={"out_position_area": "VEC4", "out_normal": "VEC4", "out_flux": "VEC4", "out_specular": "VEC4"},
-    samplers={**SURFACE_SAMPLERS, "light_tx": "FLOAT_2D", "face_tx": "FLOAT_2D"},
-    structs=(INSTANCE, MATERIAL, LIGHT, MAP_FACE),
+    samplers={**SURFACE_SAMPLERS, "face_tx": "FLOAT_2D"},
+    uniforms={"reflected_light": LIGHT},
+    structs=(INSTANCE, MATERIAL, MAP_FACE),
     constants={
         "pc_clip_from_world": "MAT4",
         "pc_first_chunk": "INT",
-        "pc_light": "INT",
         "pc_perspective": "INT",
         "pc_far": "FLOAT",
         "pc_texel_measure": "FLOAT",  # see reflective_draw_frag.glsl
