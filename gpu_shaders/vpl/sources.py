@@ -37,7 +37,7 @@ POINTS_SIDE = 64
 # Part of its tiles' width that a light gets whose power is at least such a share of the strongest one's.
 PARTS = ((1.0, 1 / 16), (0.5, 1 / 256), (0.25, 0.0))
 # An area light has a point for each such part of the scene's diagonal, up to so many, and all lights together so many.
-EMITTER_PART, MOST_EMITTER_POINTS, MOST_POINTS = 1 / 8, 9, 32
+EMITTER_PART, MOST_EMITTER_POINTS, MOST_POINTS = 1 / 8, 4, 12
 EMITTERS, CACHE, SKY_PATCHES = "emitters", "cache", "sky"  # owners of the tiles that are no light's
 
 # The face of a tile that is no picture: it "sees" every box, so that whatever moves makes it be drawn again.
