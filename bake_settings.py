@@ -23,6 +23,12 @@ BAKE_SETTINGS = (
                 "compressed; slower to bake",
             ),
             Item("WAVELET", "Sharp, Diffuse", "Haar wavelets: sharp shadows of small bright parts of the sky"),
+            Item(
+                "WAVELET_GLOSSY",
+                "Sharp, Glossy",
+                "Haar wavelets: sharp shadows, also in reflections of the roughness that the object's material has "
+                "when it is baked. Much slower to bake, much larger files",
+            ),
         ),
     ),
     Setting(
@@ -75,7 +81,8 @@ BAKE_SETTINGS = (
         "bake_error",
         "FLOAT",
         "Error",
-        "Glossy: how far compressed matrices may be off, as a part of their mean length. Higher takes less memory, "
+        "Glossy: how far compressed matrices, of sharp ones the bounces, may be off, as a part of their mean length. "
+        "Higher takes less memory, "
         "lower is truer at the cost of memory",
         0.01,
         minimum=0.0,
@@ -104,6 +111,28 @@ BAKE_SETTINGS = (
         minimum=0.5,
         maximum=1.0,
         unit="parts of the squared sum",
+    ),
+    Setting(
+        "bake_lobe",
+        "ENUM",
+        "Baked Lobe",
+        "Sharp, glossy: by which lobe the object mirrors what arrives",
+        "GGX",
+        items=(
+            Item("GGX", "GGX", "The lobe of the materials"),
+            Item("PHONG", "Phong", "The same round lobe from all sides, as wide as GGX"),
+        ),
+    ),
+    Setting(
+        "bake_lobe_terms",
+        "INT",
+        "Lobe Terms",
+        "Sharp, glossy: products of a function of the light and one of the view that make up the lobe. Higher is truer "
+        "from roughness 0.5 down, at the cost of time and memory; lower shows softer reflections",
+        24,
+        minimum=1,
+        maximum=64,
+        unit="terms",
     ),
     Setting(
         "bake_pack",

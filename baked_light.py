@@ -14,7 +14,7 @@ from .bake.view_table import LOBES, weights
 from .device.interface import Device, Target
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
-from .gpu_shaders.prt import BakedObject, BakedObjects
+from .gpu_shaders.prt import BakedObject, BakedObjects, Look
 from .gpu_shaders.prt.shaders import LOBE_BANDS, LOBE_TEXELS, LOBES_SIDE
 from .scene.data import Instance, Scene, Visibility
 from .settings import Settings
@@ -96,7 +96,7 @@ class BakedLight:
 
     def _object(self, scene: Scene, instance: Instance, settings: Mapping[str, Any]) -> BakedObject:
         live, frame = self._prepare(scene, instance), frame_of(instance.world_from_object)
-        if live.coefficients > 1 and self._lobe != settings["lobe"]:
+        if live.look is Look.HARMONICS and self._lobe != settings["lobe"]:
             self._lobe = str(settings["lobe"])
             self._objects.set_lobes(lobe_table(self._lobe))
         question = (instance.transfer, frame.tobytes(), *(settings[name] for name in ("bands", "window", "terms")))
@@ -104,7 +104,7 @@ class BakedLight:
             answer = live.answer(
                 self._surroundings, frame, int(settings["bands"]), float(settings["window"]), int(settings["terms"])
             )
-            self._objects.set_light(instance.key, answer)
+            self._objects.set_light(instance.key, answer, live.look, live.views)
             self._answered[instance.key] = question
             self.updates += 1
         place = (instance.mesh, instance.key, instance.world_from_object, frame)
@@ -139,7 +139,7 @@ def _signed(values: np.ndarray) -> np.ndarray:
 
 
 def lobe_table(lobe: str) -> np.ndarray:
-    """(views, LOBE_TEXELS roughnesses, 4): what prt_glossy_frag.glsl reads of a lobe of bake.view_table.LOBES."""
+    """(views, LOBE_TEXELS roughnesses, 4): what prt_harmonics_frag.glsl reads of a lobe of bake.view_table.LOBES."""
     table = np.zeros((LOBES_SIDE, LOBES_SIDE, 4 * LOBE_TEXELS))
     steps = np.linspace(0.0, 1.0, LOBES_SIDE)
     for row, slant in enumerate(steps):

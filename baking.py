@@ -202,10 +202,14 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
         "DIFFUSE": f"{settings['bands']} bands",
         "GLOSSY": f"{settings['bands']} bands to {settings['result_bands']}",
         "WAVELET": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
+        "WAVELET_GLOSSY": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
     if "device" in about:
         lines.append(f"Rays traced by {about['device']}")
+    if "roughness" in about:
+        lobe = f"{settings['lobe_terms']} terms of {settings['lobe']}"
+        lines.append(f"For roughness {about['roughness']:.2f}: {lobe}, {about['lobe_error']:.0%} of it left out")
     if "rms" in about:
         lines.append(f"Error of compression {about['rms']:.2%}, worst vertex {about['worst']:.1%}")
     return [*lines, f"{nbytes / 1e6:.1f} MB"] if nbytes else lines

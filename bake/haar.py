@@ -116,20 +116,19 @@ class SparseRows:
         return np.sqrt(np.bincount(self.terms, values * values, self.width))
 
 
-def sparse_rows(rows: Array, keep: float) -> SparseRows:
+def sparse_rows(rows: Array, keep: float, together: int = 1) -> SparseRows:
     """Quantise (n, width) coefficients, keeping the fraction ``keep`` (0..1) of each row's squared sum.
 
-    The largest terms that together have it are kept. Besides what is left out, a value errs by at most half a step,
-    1 / 65,534 of the row's largest; terms that come out as 0 are left out too.
+    The largest terms that together have it are kept, of so many rows ``together``. Besides what is left out, a value
+    errs by at most half a step, 1 / 65,534 of the row's largest; terms that come out as 0 are left out too.
     """
     if rows.shape[1] > 65536:
         raise ValueError(f"{rows.shape[1]} terms: a number of 16 bits counts 65,536")
-    power = rows.astype(np.float64) ** 2
-    order = np.argsort(-power, axis=1, kind="stable")
-    summed = np.cumsum(np.take_along_axis(power, order, axis=1), axis=1)
-    counts = (summed < keep * summed[:, -1:]).sum(axis=1) + 1
-    kept = np.zeros(rows.shape, bool)
-    np.put_along_axis(kept, order, np.arange(rows.shape[1]) < counts[:, None], axis=1)
+    power = (rows.astype(np.float64) ** 2).reshape(-1, together * rows.shape[1])
+    rising = np.sort(power, axis=1)
+    summed = np.cumsum(rising, axis=1)
+    dropped = (summed <= (1.0 - keep) * summed[:, -1:]).sum(axis=1).clip(max=power.shape[1] - 1)
+    kept = (power >= rising[np.arange(len(power)), dropped][:, None]).reshape(rows.shape)
     scales = (np.abs(rows).max(axis=1) / STEPS).astype(np.float32)
     steps = np.rint(rows / np.where(scales > 0, scales, 1)[:, None])
     row, term = np.nonzero(kept & (steps != 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Callable, Generator, Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
@@ -17,9 +18,15 @@ from .file import Bake
 from .glossy import glossy, turn_matrices, what_is_seen
 from .haar import SparseRows
 from .occlusion import Caster, make_caster
+from .separable import LOBES, factor, tangents
 from .surfaces import Surfaces, frame_of, gather, mesh_fingerprint
 from .transfer import Progress, Sampling, diffuse, scaled
-from .wavelets import wavelet
+from .wavelets import mirrored_bounces, wavelet
+
+_logger = logging.getLogger("rebound")  # by name: as an extension the package is bl_ext.….rebound
+
+# Roughnesses that look alike.
+_SAME_ROUGHNESS = 0.02
 
 
 class Kind(Enum):
@@ -28,6 +35,7 @@ class Kind(Enum):
     DIFFUSE = "DIFFUSE"  # a vector a vertex: soft light on matt surfaces
     GLOSSY = "GLOSSY"  # a matrix a vertex: soft light on shiny surfaces
     WAVELET = "WAVELET"  # a sparse row a vertex: light with sharp edges on matt surfaces
+    WAVELET_GLOSSY = "WAVELET_GLOSSY"  # and a few more, of a lobe: on shiny surfaces of one roughness
 
 
 @dataclass(frozen=True)
@@ -37,15 +45,17 @@ class BakeSettings:
     kind: Kind = Kind.DIFFUSE
     bands: int = 5  # 1..11, GLOSSY with result_bands 12 together: the light's detail; WAVELET: of light that bounced
     result_bands: int = 5  # GLOSSY: detail of what arrives
+    lobe: str = "GGX"  # WAVELET_GLOSSY: of separable.LOBES
+    lobe_terms: int = 24  # WAVELET_GLOSSY: products that the lobe is the sum of
     directions: int = 1024  # rays a vertex, over the whole sphere; WAVELET: of light that bounced, texels are its rays
     shadows: bool = True
     bounces: int = 2  # by way of other surfaces
     cuts: int = (
         32  # with bounces: how finely large triangles reflect, in parts of the scene's diagonal; 0: by their corners
     )
-    error: float = 0.01  # GLOSSY: root mean square error of the compression, of the matrices' length
-    texels: int = 32  # WAVELET: a power of two, up to 64; along a side of a face of the light's cube map
-    keep: float = 0.999  # WAVELET: the part of each row's energy that is kept
+    error: float = 0.01  # GLOSSY, WAVELET_GLOSSY's bounces: root mean square error of the compression, of the length
+    texels: int = 32  # WAVELET...: a power of two, up to 64; along a side of a face of the light's cube map
+    keep: float = 0.999  # WAVELET...: the part of each row's energy that is kept
     rays: str = ""  # "embree", "numpy", or "" for the better one there is
 
     def __post_init__(self) -> None:
@@ -58,12 +68,15 @@ class BakeSettings:
             "keep": (0, 1),
             "texels": (1, 64),
             "result_bands": (1, 11),
+            "lobe_terms": (1, 64),
         }
         for name, (low, high) in limits.items():
             if not low <= getattr(self, name) <= high:
                 raise ValueError(f"{name} is {getattr(self, name)}: it can be {low} to {high}")
         if self.texels & (self.texels - 1):
             raise ValueError(f"texels is {self.texels}: it can be 1, 2, 4, 8, 16, 32 or 64")
+        if self.lobe not in LOBES:
+            raise ValueError(f"lobe is {self.lobe}: it can be {' or '.join(LOBES)}")
         if self.kind is Kind.GLOSSY and self.bands + self.result_bands > sh.MAX_BANDS + 1:
             raise ValueError(f"bands and result_bands together are more than {sh.MAX_BANDS + 1}")
 
@@ -100,7 +113,19 @@ def unfit(about: Any, scene: Scene, key: Hashable, shape_of: Callable[[Mesh], st
         return "the mesh has changed since it was baked: bake again"
     if about.get("surroundings") != surroundings_fingerprint(scene, key, shape_of):
         return "what stands around the object, or a colour, has changed since it was baked: bake again"
+    if "roughness" in about and abs(about["roughness"] - roughness_of(scene, instance)[0]) > _SAME_ROUGHNESS:
+        return f"its roughness is no longer {about['roughness']:.2f}, for which it was baked: bake again"
     return ""
+
+
+def roughness_of(scene: Scene, instance: Instance) -> tuple[float, float]:
+    """Mean over the object's triangles, of those that reflect where some do, and how far they are apart."""
+    materials = [scene.materials[m] for m in instance.materials]
+    slots = scene.meshes[instance.mesh].slots
+    used = [(materials[min(slot, len(materials) - 1)], count) for slot, _, count in slots if count]
+    used = [(material, count) for material, count in used if material.is_glossy] or used
+    values = [material.roughness for material, _ in used]
+    return float(np.average(values, weights=[count for _, count in used])), max(values) - min(values)
 
 
 def bake_objects(
@@ -126,7 +151,7 @@ def bake_objects(
     if settings.kind is Kind.DIFFUSE:
         found = yield from _diffuse(surfaces, caster, instances, settings)
     else:
-        found = yield from _one_by_one(surfaces, caster, instances, settings)
+        found = yield from _one_by_one(scene, surfaces, caster, instances, settings)
     facts = {"device": device}
     return {key: Bake(_about(scene, key, settings) | facts | more, arrays) for key, (more, arrays) in found.items()}
 
@@ -160,20 +185,22 @@ def _diffuse(
 
 
 def _one_by_one(
-    surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
+    scene: Scene, surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
 ) -> Generator[Progress, None, Found]:
     """Glossy matrices or wavelet rows of each; what they have in common, light that bounced, is found once before."""
     sampling, bounced, start = _sampling(settings), None, 0.0
     if settings.bounces and settings.shadows:
-        wanted = what_is_seen(sampling) if settings.kind is Kind.GLOSSY else sampling
+        wanted = sampling if settings.kind is Kind.WAVELET else what_is_seen(sampling)
         bounced, start = (yield from scaled(diffuse(surfaces, caster, wanted), 0.0, 0.4)), 0.4
     found: Found = {}
     for number, instance in enumerate(instances):
-        of_one = _glossy if settings.kind is Kind.GLOSSY else _wavelet
+        if settings.kind is Kind.WAVELET_GLOSSY:
+            work = _wavelet_glossy(scene, surfaces, caster, instance, settings, bounced)
+        else:
+            of_one = _glossy if settings.kind is Kind.GLOSSY else _wavelet
+            work = of_one(surfaces, caster, instance, settings, bounced)
         part = (1.0 - start) / len(instances)
-        found[instance.key] = yield from scaled(
-            of_one(surfaces, caster, instance, settings, bounced), start + number * part, part
-        )
+        found[instance.key] = yield from scaled(work, start + number * part, part)
     return found
 
 
@@ -184,7 +211,12 @@ def _glossy(
     bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows, seen)
     matrices = yield from scaled(bake, 0.0, 0.8)
     matrices = turn_matrices(matrices, frame_of(instance.world_from_object))
-    packed = yield from scaled(compress(matrices.reshape(len(rows), -1), settings.error), 0.8, 0.2)
+    return (yield from scaled(_compressed(matrices, settings.error), 0.8, 0.2))
+
+
+def _compressed(matrices: Array, error: float) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
+    """Of matrices (n, channels, results, light)."""
+    packed = yield from compress(matrices.reshape(len(matrices), -1), error)
     more = {"matrix": list(matrices.shape[1:]), "rms": packed.rms, "worst": packed.worst}
     arrays = {"clusters": packed.clusters.astype(np.uint32), "means": packed.means}
     if packed.weights.shape[1]:  # means alone may be enough
@@ -197,22 +229,57 @@ def _wavelet(
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
     frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
     work = wavelet(surfaces, caster, settings.texels, settings.keep, frame, rows, settings.shadows)
-    sparse = yield from scaled(work, 0.0, 0.8)
-    arrays = {"counts": np.diff(sparse.starts).astype(np.uint32), "scales": sparse.scales}
-    if len(sparse.terms):  # a wholly hidden object has none
-        arrays |= {"terms": sparse.terms.astype(np.uint32), "steps": sparse.steps.astype(np.float32)}
+    sparse, _ = yield from scaled(work, 0.0, 0.8)
+    arrays = _sparse_arrays("", sparse)
     if lit is not None:
         first = yield from scaled(diffuse(surfaces, caster, replace(_sampling(settings), bounces=0), rows), 0.8, 0.2)
         arrays["bounced"] = sh.rotate(lit[rows] - first[rows], frame.T).astype(np.float16)
     return {"width": sparse.width}, arrays
 
 
-def wavelet_rows(bake: Bake) -> SparseRows:
-    """The rows of a file of Kind.WAVELET."""
+def _wavelet_glossy(
+    scene: Scene, surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
+) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
+    frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
+    roughness, apart = roughness_of(scene, instance)
+    if apart > _SAME_ROUGHNESS:
+        _logger.warning(
+            "Object '%s' has surfaces of several roughnesses: it is baked with their mean, %.2f",
+            instance.key,
+            roughness,
+        )
+    lobe = factor(LOBES[settings.lobe], roughness, settings.lobe_terms)
+    work = wavelet(surfaces, caster, settings.texels, settings.keep, frame, rows, settings.shadows, lobe)
+    sparse, mirrored = yield from scaled(work, 0.0, 0.8)
+    assert mirrored is not None
+    normals = surfaces.normals[rows]
+    arrays = _sparse_arrays("", sparse) | _sparse_arrays("lobe_", mirrored)
+    arrays["turns"] = (np.stack([normals, tangents(normals)], axis=1) @ frame).astype(np.float32)
+    more: dict[str, Any] = {"width": sparse.width, "roughness": roughness, "lobe_error": lobe.error}
+    if seen is not None and surfaces.reflectance.any():
+        bounces = mirrored_bounces(surfaces, caster, _sampling(settings), rows, seen, lobe)
+        matrices = sh.rotate((yield from scaled(bounces, 0.8, 0.1)), frame.T)
+        if matrices.any():
+            facts, packed = yield from scaled(_compressed(matrices, settings.error), 0.9, 0.1)
+            more, arrays = more | facts, arrays | packed
+    return more, arrays | {"lobe": lobe.table()}
+
+
+def _sparse_arrays(prefix: str, sparse: SparseRows) -> dict[str, Array]:
+    arrays = {f"{prefix}counts": np.diff(sparse.starts).astype(np.uint32), f"{prefix}scales": sparse.scales}
+    if len(sparse.terms):  # a wholly hidden object has none
+        numbers = {"terms": sparse.terms.astype(np.uint32), "steps": sparse.steps.astype(np.float32)}
+        arrays |= {prefix + name: array for name, array in numbers.items()}
+    return arrays
+
+
+def wavelet_rows(bake: Bake, prefix: str = "") -> SparseRows:
+    """The rows of a file of Kind.WAVELET or WAVELET_GLOSSY, whose lobe's rows have the ``prefix`` "lobe_"."""
     arrays, nothing = bake.arrays, np.zeros(0)
-    starts = np.concatenate([[0], np.cumsum(arrays["counts"].astype(np.int64))])
-    terms, steps = arrays.get("terms", nothing), arrays.get("steps", nothing)
-    return SparseRows(starts, terms.astype(np.uint16), steps.astype(np.int16), arrays["scales"], bake.about["width"])
+    counts, scales = arrays[f"{prefix}counts"], arrays[f"{prefix}scales"]
+    starts = np.concatenate([[0], np.cumsum(counts.astype(np.int64))])
+    terms, steps = arrays.get(f"{prefix}terms", nothing), arrays.get(f"{prefix}steps", nothing)
+    return SparseRows(starts, terms.astype(np.uint16), steps.astype(np.int16), scales, bake.about["width"])
 
 
 def glossy_matrices(bake: Bake) -> Compressed:

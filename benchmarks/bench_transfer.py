@@ -123,7 +123,7 @@ def wavelet_table(surfaces: Surfaces, caster: Caster, whole: haar.SparseRows, li
     right, everything = whole.dot(coefficients), np.arange(len(surfaces.positions))
     rows = []
     for keep in (0.9, 0.99, 0.999, 0.9999):
-        found = finish(wavelet(surfaces, caster, TEXELS, keep, np.eye(3), everything))
+        found = finish(wavelet(surfaces, caster, TEXELS, keep, np.eye(3), everything))[0]
         each = found.nbytes / len(everything)
         terms = len(found.terms) / len(everything)
         rows.append([str(keep), f"{terms:.0f}", f"{each:,.0f} B", significant(error(found.dot(coefficients), right))])
@@ -151,7 +151,7 @@ def main() -> None:
     surfaces = gather(ball_on_floor(), frozenset())
     caster = make_caster(surfaces.corners, "embree")
     everything = np.arange(len(surfaces.positions))
-    whole = finish(wavelet(surfaces, caster, TEXELS, 1.0, np.eye(3), everything))
+    whole = finish(wavelet(surfaces, caster, TEXELS, 1.0, np.eye(3), everything))[0]
     basis = sh.evaluate(sphere.cube_directions(TEXELS).reshape(-1, 3), sh.MAX_BANDS)
     parts = []
     for name, light in skies().items():

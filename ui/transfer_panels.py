@@ -15,9 +15,10 @@ from .rebound_panel import ReboundPanel, draw_settings
 
 # Rows that a basis has nothing to do with.
 NOT_OF = {
-    "DIFFUSE": {"bake_result_bands", "bake_error", "bake_texels", "bake_keep"},
-    "GLOSSY": {"bake_texels", "bake_keep"},
-    "WAVELET": {"bake_result_bands", "bake_error"},
+    "DIFFUSE": {"bake_result_bands", "bake_error", "bake_texels", "bake_keep", "bake_lobe", "bake_lobe_terms"},
+    "GLOSSY": {"bake_texels", "bake_keep", "bake_lobe", "bake_lobe_terms"},
+    "WAVELET": {"bake_result_bands", "bake_error", "bake_lobe", "bake_lobe_terms"},
+    "WAVELET_GLOSSY": {"bake_result_bands"},
 }
 
 

@@ -4,9 +4,10 @@ P.-P. Sloan, J. Kautz, J. Snyder, "Precomputed Radiance Transfer", SIGGRAPH 2002
 "All-Frequency Shadows Using Non-linear Wavelet Lighting Approximation", SIGGRAPH 2003.
 
 1. The light of the vertices comes from ``bake.live``, by products of matrices, whenever the surroundings or their
-   rotation change: irradiance / pi, or harmonics of the arriving radiance.
+   rotation change: irradiance / pi, and harmonics of the arriving radiance or the numbers of a lobe's factors.
 2. The objects are drawn again where the G-buffer has them. A pixel mixes its vertices' light; harmonics are convolved
-   with the cosine there, and multiplied with the weights that the material's lobe has from this view.
+   with the cosine there, and multiplied with the weights that the material's lobe has from this view; numbers are
+   multiplied with the factors of the view.
 3. What was drawn is added to the direct light. The G-buffer's position is marked, so that no technique adds the sky.
 
 Limits: docs/prt.md. Between the vertices light is mixed, so it is as fine as the mesh.
@@ -23,9 +24,9 @@ from ...device.interface import Device, DrawState, Target, Texture, Vertices
 from ..frame.draws import ADD
 from ..frame.inputs import HAS_SKY, HAS_SKY_BOUNCES, HAS_SKY_MIRRORED, FrameInputs, LightTargets
 from ..frame.shaders import RESOLVE
-from .shaders import DRAW, PRT_DRAW, SHADERS
+from .shaders import DRAW, PRT_DRAW, SHADERS, Look
 
-__all__ = ["SHADERS", "BakedObject", "BakedObjects"]
+__all__ = ["SHADERS", "BakedObject", "BakedObjects", "Look"]
 
 # Texels in a row of a texture of vertices.
 ROW_TEXELS = 2048
@@ -36,15 +37,24 @@ OVER_GBUFFER = DrawState(depth_test="EQUAL")
 
 
 @dataclass(eq=False)
+class _Light:
+    """What one object's vertices have."""
+
+    texture: Texture
+    look: Look
+    coefficients: int  # of a vertex
+    texels: int  # of a vertex
+    views: Texture | None  # Look.LOBE: the factors of the view
+
+
+@dataclass(eq=False)
 class BakedObject:
     """One object's mesh by corners and the light of its vertices."""
 
     world_from_object: np.ndarray  # (4, 4)
     frame: np.ndarray  # (3, 3): the axes of the bake in the world
     vertices: Vertices
-    light: Texture
-    coefficients: int  # of the arriving radiance; 1: irradiance / pi
-    texels: int  # of one vertex
+    light: _Light
     has: int  # HAS_... bits of frame.inputs
 
 
@@ -54,7 +64,7 @@ class BakedObjects:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._meshes: dict[Hashable, Vertices] = {}
-        self._lights: dict[Hashable, tuple[Texture, int, int]] = {}
+        self._lights: dict[Hashable, _Light] = {}
         self._lobes: Texture | None = None
         self._pictures: Target | None = None  # diffuse, glossy
         self._target: Target | None = None  # the G-buffer's position, and those
@@ -68,21 +78,27 @@ class BakedObjects:
         triangles = np.repeat(vertices.reshape(-1, 3).astype(np.int32), 3, axis=0)
         self._meshes[key] = self.device.vertices({"in_position": positions, "in_triangle": triangles})
 
-    def set_light(self, key: Hashable, light: np.ndarray) -> None:
-        """(vertices, coefficients, 3) float32 of one object."""
+    def set_light(
+        self, key: Hashable, light: np.ndarray, look: Look = Look.MATT, views: np.ndarray | None = None
+    ) -> None:
+        """(vertices, coefficients, 3) float32 of one object; of a lobe also the (VIEWS, K, 4) factors of the view."""
         count, coefficients, _ = light.shape
-        texels = 1 if coefficients == 1 else -(-3 * coefficients // 4)
+        texels = -(-3 * coefficients // 4) if look is Look.HARMONICS else coefficients
         row = ROW_TEXELS // texels
         height = -(-count // row)
-        filled = np.zeros((height * row, 4 * texels), np.float32)
-        filled[:count, : 3 * coefficients] = light.reshape(count, -1)
+        filled = np.zeros((height * row, texels, 4), np.float32)
+        if look is Look.HARMONICS:  # in a row, as there are most of them
+            filled.reshape(height * row, -1)[:count, : 3 * coefficients] = light.reshape(count, -1)
+        else:
+            filled[:count, :, :3] = light
         if key in self._lights:
-            self.device.free(self._lights[key][0])
-        data = filled.reshape(height, row * texels, 4)
-        self._lights[key] = (self.device.texture((row * texels, height), "RGBA32F", data), coefficients, texels)
+            self._free_light(key)
+        texture = self.device.texture((row * texels, height), "RGBA32F", filled.reshape(height, row * texels, 4))
+        table = None if views is None else self.device.texture(views.shape[1::-1], "RGBA32F", views)
+        self._lights[key] = _Light(texture, look, coefficients, texels, table)
 
     def set_lobes(self, table: np.ndarray) -> None:
-        """(views, LOBE_TEXELS roughnesses, 4) of LOBES_SIDE a side: see prt_weights() in prt_glossy_frag.glsl."""
+        """(views, LOBE_TEXELS roughnesses, 4) of LOBES_SIDE a side: see prt_weights() in prt_harmonics_frag.glsl."""
         self.device.free(self._lobes)
         self._lobes = self.device.texture((table.shape[1], table.shape[0]), "RGBA32F", table.astype(np.float32))
 
@@ -90,16 +106,16 @@ class BakedObjects:
         self, mesh: Hashable, light: Hashable, world_from_object: np.ndarray, frame: np.ndarray, *, bounces: bool
     ) -> BakedObject:
         """Of a mesh and a light that were told before. ``bounces``: whether the bake has light that bounced."""
-        texture, coefficients, texels = self._lights[light]
-        has = HAS_SKY | HAS_SKY_MIRRORED * (coefficients > 1) | HAS_SKY_BOUNCES * bounces
-        return BakedObject(world_from_object, frame, self._meshes[mesh], texture, coefficients, texels, has)
+        of_vertices = self._lights[light]
+        has = HAS_SKY | HAS_SKY_MIRRORED * (of_vertices.look is not Look.MATT) | HAS_SKY_BOUNCES * bounces
+        return BakedObject(world_from_object, frame, self._meshes[mesh], of_vertices, has)
 
     def keep(self, meshes: set[Hashable], lights: set[Hashable]) -> None:
         """Give everything else back."""
         for key in self._meshes.keys() - meshes:
             self.device.free(self._meshes.pop(key))
         for key in self._lights.keys() - lights:
-            self.device.free(self._lights.pop(key)[0])
+            self._free_light(key)
 
     def draw(
         self, inputs: FrameInputs, objects: list[BakedObject], targets: LightTargets, *, glossy: bool, seen=(True, True)
@@ -126,7 +142,7 @@ class BakedObjects:
         pictures, over = self._targets(inputs)
         self.device.clear(pictures)
         for one in objects:
-            is_full = one.coefficients > 1
+            light = one.light
             rotation = np.eye(4)
             rotation[:3, :3] = one.frame.T
             block = {
@@ -135,22 +151,28 @@ class BakedObjects:
                 "local_from_world": rotation,
                 "eye": inputs.eye,
                 "has": one.has,
-                "row": ROW_TEXELS // one.texels,
-                "texels": one.texels,
-                "coefficients": one.coefficients,
+                "row": ROW_TEXELS // light.texels,
+                "texels": light.texels,
+                "coefficients": light.coefficients,
             }
-            looks = {"normal_tx": inputs.gbuffer.normal, "specular_tx": inputs.gbuffer.specular, "lobe_tx": self._lobes}
+            lobe = light.views or self._lobes
+            looks = {"normal_tx": inputs.gbuffer.normal, "specular_tx": inputs.gbuffer.specular, "lobe_tx": lobe}
             self.device.draw(
-                DRAW[is_full],
+                DRAW[light.look],
                 one.vertices,
                 over,
                 state=OVER_GBUFFER,
-                light_tx=one.light,
+                light_tx=light.texture,
                 prt_draw=PRT_DRAW.pack([block], for_uniform=True),
-                **(looks if is_full else {}),
+                **(looks if light.look is not Look.MATT else {}),
             )
         diffuse, mirrored = pictures.colors
         return diffuse, mirrored
+
+    def _free_light(self, key: Hashable) -> None:
+        light = self._lights.pop(key)
+        self.device.free(light.texture)
+        self.device.free(light.views)
 
     def free(self) -> None:
         self.keep(set(), set())

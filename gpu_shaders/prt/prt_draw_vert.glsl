@@ -7,7 +7,7 @@ void main()
   v_position = world.xyz;
   gl_Position = mesh_clip(prt_draw.clip_from_world, world);
   int corner = gl_VertexID % 3;
-#ifdef GLOSSY
+#ifdef MIXED
   v_triangle = ivec4(in_triangle, 0);
   v_weights = vec3(corner == 0, corner == 1, corner == 2);
 #else

@@ -1,5 +1,7 @@
 """Declarations of the passes that draw what baked objects pass on."""
 
+from enum import Enum
+
 from ...device.shader import Shader
 from ...device.structs import Struct
 
@@ -8,6 +10,18 @@ from ...device.structs import Struct
 LOBES_SIDE = 32
 LOBE_BANDS = 6
 LOBE_TEXELS = -(-LOBE_BANDS * (LOBE_BANDS - 1) // 4)
+
+# Rows of the table of a lobe that is a sum of products (bake/separable.py).
+VIEWS = 64
+
+
+class Look(Enum):
+    """What the numbers of a vertex are."""
+
+    MATT = "matt"  # irradiance / pi
+    HARMONICS = "harmonics"  # of the arriving radiance
+    LOBE = "lobe"  # irradiance / pi, the numbers that a lobe's factors of the view weigh, normal and tangent
+
 
 PRT_DRAW = Struct(
     "PrtDraw",
@@ -18,37 +32,42 @@ PRT_DRAW = Struct(
     has="int",  # what the pixels' position.w says (frame.inputs.HAS_DEFINES)
     row="int",  # vertices in a row of the texture
     texels="int",  # of a vertex
-    coefficients="int",  # of the arriving radiance
+    coefficients="int",  # of one vertex
 )
 
-_GLOSSY = (
-    ("GLOSSY", "1"),
-    ("PRT_LOBES", str(LOBES_SIDE)),
-    ("PRT_BANDS", str(LOBE_BANDS)),
-    ("PRT_TEXELS", str(LOBE_TEXELS)),
-)
+_DEFINES = {
+    Look.MATT: (),
+    Look.HARMONICS: (
+        ("MIXED", "1"),
+        ("PRT_LOBES", str(LOBES_SIDE)),
+        ("PRT_BANDS", str(LOBE_BANDS)),
+        ("PRT_TEXELS", str(LOBE_TEXELS)),
+    ),
+    Look.LOBE: (("MIXED", "1"), ("PRT_VIEWS", str(VIEWS))),
+}
 
 
-def _draw(glossy: bool) -> Shader:
+def _draw(look: Look) -> Shader:
+    mixed = look is not Look.MATT
     varyings = {"v_position": "VEC3"}
-    varyings |= {"v_weights": "VEC3", "v_triangle": "flat IVEC4"} if glossy else {"v_light": "VEC3"}
+    varyings |= {"v_weights": "VEC3", "v_triangle": "flat IVEC4"} if mixed else {"v_light": "VEC3"}
     return Shader(
-        name="prt_draw_glossy" if glossy else "prt_draw",
+        name=f"prt_draw_{look.value}",
         vertex="prt/prt_draw_vert.glsl",
-        fragment=f"prt/prt_{'glossy' if glossy else 'diffuse'}_frag.glsl",
+        fragment=f"prt/prt_{look.value}_frag.glsl",
         inputs={"in_position": "VEC3", "in_triangle": "IVEC3"},
         varyings=varyings,
         outputs={"out_position": "VEC4", "out_diffuse": "VEC4", "out_glossy": "VEC4"},
         samplers={
             "light_tx": "FLOAT_2D",
-            **({"normal_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D", "lobe_tx": "FLOAT_2D"} if glossy else {}),
+            **({"normal_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D", "lobe_tx": "FLOAT_2D"} if mixed else {}),
         },
         uniforms={"prt_draw": PRT_DRAW},
-        defines=_GLOSSY if glossy else (),
+        defines=_DEFINES[look],
     )
 
 
-# By whether the bake has what arrives from every direction.
-DRAW = {glossy: _draw(glossy) for glossy in (False, True)}
+# By what the bake has.
+DRAW = {look: _draw(look) for look in Look}
 
 SHADERS = tuple(DRAW.values())

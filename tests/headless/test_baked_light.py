@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rebound.bake import sh
+from rebound.bake import separable, sh
 from rebound.bake.glossy import open_matrices
 from rebound.bake.job import BakeSettings, Kind
+from rebound.bake.light import Surroundings
+from rebound.bake.live import make_live
 from rebound.bake.sphere import quadrature
 from rebound.scene.data import Material, Visibility, World
 from rebound.tests.support.bake_scenes import grid
@@ -128,6 +130,28 @@ def test_mirrored_light_is_the_lobe_summed_over_what_arrives(studio, lobe, value
         cosine = np.sqrt(1.0 - (((pixel + 0.5) / 32 * 1.2 - 0.6) / 0.5) ** 2 - (0.5 / 32 * 1.2 / 0.5) ** 2)
         shares = values(towards, roughness, cosine) * areas
         assert found["glossy_direct"][16, pixel, 0] == pytest.approx(shares @ arrives / shares.sum(), abs=0.01), pixel
+
+
+@pytest.mark.parametrize("lobe", ["GGX", "PHONG"])
+def test_glossy_wavelets_are_seen_as_their_factors_say(studio, lobe):
+    """A metal ball under a sky with a bright side, pixel by pixel: the twin of the shader, mixed over the triangles."""
+    metal = Material("Metal", (1.0, 1.0, 1.0), metallic=1.0, roughness=0.6)
+    alone = scene([sphere("ball", (0, 0, 0), 0.5, rings=48)], materials=[metal], world=World((1.0, 0.5, 0.25)))
+    made = BakeSettings(kind=Kind.WAVELET_GLOSSY, texels=16, keep=0.9999, bounces=0, lobe=lobe, directions=16)
+    shown = baked(alone, made)
+    found = studio.render(shown, ortho(32, 32, 1.2), 1, ("glossy_direct",), method="NONE", transfer_terms=6144)
+    live = make_live(next(iter(shown.transfers.values())))
+    numbers = live.answer(Surroundings(np.array(alone.world.color)), np.eye(3), 5, 0.0, 6144)
+    factors = separable.factor(separable.LOBES[lobe], 0.6, 24)
+    for pixel in range(8, 24):
+        x = (pixel + 0.5) / 32 * 1.2 - 0.6
+        normal = np.array([x, 0.5 / 32 * -1.2, 0.0]) / 0.5
+        normal[2] = np.sqrt(1.0 - normal @ normal)
+        vertex = numbers[np.argmax(numbers[:, -2] @ normal)]
+        view = np.array([[vertex[-1, 2], np.cross(vertex[-2], vertex[-1])[2], vertex[-2, 2]]])
+        right = factors.of_view(view)[0] @ vertex[1:-2]
+        np.testing.assert_allclose(found["glossy_direct"][16, pixel], right, rtol=0.02, atol=0.005)
+    assert found["glossy_direct"][12:20, 12:20, 0].mean() == pytest.approx(1.0, abs=0.02)
 
 
 def test_objects_that_take_no_indirect_light_take_no_baked_one(studio):

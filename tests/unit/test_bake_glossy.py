@@ -95,7 +95,7 @@ def test_bake_in_turned_axes_is_the_turned_bake():
 def test_wavelet_rows_agree_with_spherical_harmonics(size):
     """A soft sky of three bands lights both ways alike; 16² texels a face and 99.9 % of each row's energy."""
     surfaces, caster = surfaces_of(SCENE)
-    rows = finish(wavelet(surfaces, caster, size, 0.999, np.eye(3), all_rows(surfaces)))
+    rows = finish(wavelet(surfaces, caster, size, 0.999, np.eye(3), all_rows(surfaces)))[0]
     sky = np.array([2.0, 0.5, 0.7, 0, 0, 0.2, 0.3, 0, 0])
     cube = sh.evaluate(sphere.cube_directions(size), 3) @ sky
     by_texels = rows.dot(haar.forward(cube).reshape(-1))
@@ -108,7 +108,7 @@ def test_wavelet_rows_of_an_open_plane_add_up_to_white_in_any_frame():
     surfaces, caster = surfaces_of(placed(quad("floor")))
     white = haar.forward(np.ones((6, 32, 32))).reshape(-1)
     for frame in (np.eye(3), TURN):
-        rows = finish(wavelet(surfaces, caster, 32, 0.9999, frame, all_rows(surfaces)))
+        rows = finish(wavelet(surfaces, caster, 32, 0.9999, frame, all_rows(surfaces)))[0]
         assert np.allclose(rows.dot(white), 1, atol=0.005)
 
 
@@ -116,7 +116,7 @@ def test_small_sun_throws_a_sharp_shadow_by_wavelets():
     """A sun of one texel overhead: the floor under a ball is dark, a step beside it as bright as without the ball."""
     ball = render_scenes.sphere("ball", (0, 0, 1.0), 0.5, rings=12)
     surfaces, caster = surfaces_of(placed(grid("floor", 3.0, 12), ball))
-    rows = finish(wavelet(surfaces, caster, 32, 0.9999, np.eye(3), all_rows(surfaces)))
+    rows = finish(wavelet(surfaces, caster, 32, 0.9999, np.eye(3), all_rows(surfaces)))[0]
     sun = np.zeros((6, 32, 32))
     sun[4, 16, 16] = 1.0 / sphere.cube_solid_angles(32)[4, 16, 16]
     lit = rows.dot(haar.forward(sun).reshape(-1))[surfaces.runs["floor"]] * np.pi
