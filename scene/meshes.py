@@ -154,6 +154,8 @@ def _is_identity(order: Array, count: int) -> bool:
 
 
 def _slot_ranges(slots: Array) -> tuple[tuple[int, int, int], ...]:
+    if slots[0] == slots[-1]:  # sorted, so that all are
+        return ((int(slots[0]), 0, len(slots)),)
     values, first, counts = np.unique(slots, return_index=True, return_counts=True)
     return tuple((int(v), int(f), int(c)) for v, f, c in zip(values, first, counts, strict=True))
 

@@ -193,8 +193,9 @@ def _cells(normal: Array) -> Array:
     for turn in (1, 2):
         across = np.choose(axis, [normal[(k + turn) % 3] for k in range(3)])
         with np.errstate(all="ignore"):
-            place = np.nan_to_num((across / along + 1.0) * (0.5 * _CELLS_A_SIDE))
-        number = number * _CELLS_A_SIDE + np.clip(place, 0, _CELLS_A_SIDE - 1).astype(np.uint8)
+            place = (across / along + 1.0) * (0.5 * _CELLS_A_SIDE)
+        # fmin and fmax put what has no direction, and no area, into any cell.
+        number = number * _CELLS_A_SIDE + np.fmax(np.fmin(place, _CELLS_A_SIDE - 1), 0).astype(np.uint8)
     return number
 
 
