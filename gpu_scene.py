@@ -65,6 +65,7 @@ class GpuScene:
         self._told = np.zeros((0, 13))  # what materials can ask of them beside their place: _instance_row()
         self.seen_through: tuple[Draw, ...] = ()  # what a camera may look through
         self.passing_boxes = np.zeros((0, 2, 3))  # world boxes of what blocks a part of lamps' light
+        self._has_thin = False  # whether anything drawn does, or stops it on one side only
         self._visible: dict[int, tuple[tuple[Draw, ...], np.ndarray]] = {}
         self._meshes = MeshPages(device, self.uploads)
         self.batches = Batches(device)
@@ -170,10 +171,12 @@ class GpuScene:
         return waited
 
     def _programs_of(self, draw: Draw, code: MaterialShader) -> list[Shader]:
-        passes = self.scene.materials[draw.material].passing > 0.0
-        drawn = (GBUFFER, REFLECT, SHADOW_PASSING) if passes else (GBUFFER, REFLECT)
+        material = self.scene.materials[draw.material]
+        passes = material.passing > 0.0
+        thin = passes or material.culled_by_lamps
+        drawn = (GBUFFER, REFLECT, SHADOW_PASSING) if thin else (GBUFFER, REFLECT)
         return [
-            *(material_program(shader, code, passes) for shader in drawn),
+            *(material_program(shader, code, passes, self.culls(draw.material, shader)) for shader in drawn),
             material_program(SURFACE_POINT_DRAW, code),
         ]
 
@@ -192,10 +195,18 @@ class GpuScene:
             draw.bounds for draw in thin if self.lets_lamps_pass(draw.material) and Visibility.SHADOW in draw.visibility
         ]
         self.passing_boxes = np.array(passing).reshape(-1, 2, 3)
+        materials = self.scene.materials
+        self._has_thin = bool(passing) or any(materials[draw.material].culled_by_lamps for draw in self.draws)
 
     def lets_lamps_pass(self, material: int) -> bool:
         """Whether lamps light what is behind a material: Blender's Transparent Shadows."""
         return self.lets_pass(material) and self.scene.materials[material].passes_lamps
+
+    def culls(self, material: int, shader: Shader) -> bool:
+        """Whether a pass draws nothing of the backs of a material's faces: as its camera or its lamp sees them."""
+        of_camera = ("MATERIAL_CAMERA_RAY", "1") in shader.defines
+        found = self.scene.materials[material]
+        return found.culled if of_camera else found.culled_by_lamps
 
     def material_inputs(self, program: Shader) -> dict[str, Any]:
         """What a program of ``material_program`` wants to know of all materials."""
@@ -235,10 +246,12 @@ class GpuScene:
         return self._visible[wanted]
 
     def divided(self, draws: Sequence[Draw]) -> tuple[Sequence[Draw], Sequence[Draw]]:
-        """Those of ``draws`` that stop all light of lamps, and those that let some of it pass."""
-        if not len(self.passing_boxes):
+        """Those of ``draws`` that stop all light of lamps, and those that let some of it pass or on one side all."""
+        if not self._has_thin:
             return draws, ()
-        passes = {material: self.lets_lamps_pass(material) for material in {draw.material for draw in draws}}
+        materials = self.scene.materials
+        worn = {draw.material for draw in draws}
+        passes = {index: self.lets_lamps_pass(index) or materials[index].culled_by_lamps for index in worn}
         return [d for d in draws if not passes[d.material]], [d for d in draws if passes[d.material]]
 
     @property

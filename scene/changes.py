@@ -159,7 +159,8 @@ def _recoloured(old: Scene, new: Scene) -> set[int]:
 
 def _lets_pass(instance: Instance | None, scene: Scene) -> bool:
     """Whether the materials decide what light an instance blocks."""
-    return instance is not None and any(scene.materials[index].passing for index in instance.materials)
+    worn = [scene.materials[index] for index in instance.materials] if instance is not None else []
+    return any(material.passing or material.culled_by_lamps for material in worn)
 
 
 def _same_look(a: Instance, b: Instance, old: Scene, new: Scene) -> bool:

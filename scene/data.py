@@ -194,6 +194,8 @@ class Material:
     layered: float = 1.0  # 0..1: how much of ``specular`` lies over the diffuse part and takes its light from it
     passing: float = 0.0  # 0..1: of light that goes on through it; above 0 only with a graph
     passes_lamps: bool = True  # whether lamps and suns light what is behind it, as far as it lets light pass
+    culled: bool = False  # whether cameras see nothing of the backs of its faces
+    culled_by_lamps: bool = False  # whether light of lamps goes on through the backs of its faces
     base_color_texture: Texture | None = None  # the image that the graph lays on as its base colour
     graph: FilledGraph | None = None  # what it is drawn by; None: it is the same all over
     index: int = 0  # its pass index, which Object Info tells

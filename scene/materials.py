@@ -74,6 +74,8 @@ class MaterialTable:
             graph=None if look.is_exact else filled,
             index=material.pass_index,
             passes_lamps=material.use_transparent_shadow,
+            culled=material.use_backface_culling,
+            culled_by_lamps=material.use_backface_culling_shadow,
         )
 
     def _mean(self, image: Hashable) -> Array:

@@ -109,7 +109,8 @@ class Batches:
             if material not in programs:
                 code = gpu_scene.code_of(material) if asks else None
                 images = tuple(gpu_scene.image_inputs(material).values()) if asks else ()
-                programs[material] = material_program(shader, code, asks and passes(material)), images
+                how = asks and passes(material), asks and gpu_scene.culls(material, shader)
+                programs[material] = material_program(shader, code, *how), images
             alone = draw.number if self._instances[draw.number] > 1 else -1
             groups[programs[material], draw.page, alone].append(draw)
         if not groups:

@@ -8,6 +8,11 @@ void main()
   vec3 V = math_toward(v_position, pc_eye);
   MaterialPlace place = material_place(V);
   Surface surface = material_seen(place);
+#ifdef MATERIAL_CULLS
+  if (place.backfacing > 0.5) {
+    discard;
+  }
+#endif
   float mean = (surface.passing.r + surface.passing.g + surface.passing.b) / 3.0;
   vec4 tint = vec4(mean > 0.0 ? surface.passing / mean : vec3(1.0), 1.0);
   out_albedo = tint;

@@ -28,10 +28,15 @@ Surface material_seen(inout MaterialPlace place)
   return surface_toward(surface, dot(place.normal, place.toward));
 }
 
-/* The same as it is drawn: no fragment where it lets this sample pass. */
+/* The same as it is drawn: no fragment where it lets this sample pass, or on a back that is culled. */
 Surface material_drawn(inout MaterialPlace place)
 {
   Surface surface = material_seen(place);
+#ifdef MATERIAL_CULLS
+  if (place.backfacing > 0.5) {
+    discard;
+  }
+#endif
 #ifdef MATERIAL_PASSES
   if (material_is_passed(surface.coverage)) {
     discard;

@@ -60,15 +60,16 @@ def attribute_sampler(field: str) -> str:
 
 
 @lru_cache(maxsize=4096)
-def material_program(plain: Shader, code: MaterialShader | None, passes: bool = False) -> Shader:
-    """The variant of a pass for a graph. ``plain``: its declaration for constants; ``passes``: some light goes through.
+def material_program(plain: Shader, code: MaterialShader | None, passes: bool = False, culls: bool = False) -> Shader:
+    """The variant of a pass for a graph. ``plain``: its declaration for constants; ``passes``: some light goes through;
+    ``culls``: nothing is drawn of the backs of faces.
 
     Where it draws meshes it gets their attributes from `uv_tx`, `uv_0_tx`, `color_1_tx`, …; a pass that does not, from
     attribute_tx, in the order of ``MaterialShader.mesh_fields`` for each point.
     """
-    passing = (("MATERIAL_PASSES", "1"),) if passes else ()
+    passing = (*([("MATERIAL_PASSES", "1")] if passes else []), *([("MATERIAL_CULLS", "1")] if culls else []))
     if code is None:
-        return plain if not passes else replace(plain, defines=(*plain.defines, *passing))
+        return replace(plain, defines=(*plain.defines, *passing)) if passing else plain
     meshes = "chunk_tx" in plain.samplers
     asks_view = any(FIELDS.get(need, "").find("material_view") >= 0 for need in code.needs)
     # Of fields that need the instance, those of a point are always there.

@@ -1,4 +1,4 @@
-/* Shadows of what lets light pass: of each texel's light as much is stopped, all or nothing, as of the whole. The
+/* Shadows of what lets light pass, on the whole or through the backs of faces: of each texel's light as much is stopped, all or nothing, as of the whole. The
  * material is asked from the side of what the shadow falls on, whence Cycles' rays come. */
 #include "frame/material_dither_lib.glsl"
 #include "frame/material_mesh_lib.glsl"
@@ -11,6 +11,12 @@ void main()
   MaterialPlace place = material_place(toward);
   Surface surface = material_seen(place);
   shadow_write();
+#ifdef MATERIAL_CULLS
+  /* The lamp is on the other side of the face. */
+  if (dot(v_normal, place.geometric) > 0.0) {
+    discard;
+  }
+#endif
   if (material_is_passed(surface.coverage)) {
     discard;
   }

@@ -36,6 +36,22 @@ def test_transparent_shadows_are_the_materials_choice(sheet, tmp_path, passes, w
     assert found[..., :3].mean() == pytest.approx(0.8 * wanted, abs=0.02)  # the floor's colour, of a sun of pi W/m2
 
 
+@pytest.mark.parametrize(
+    ("turned", "camera", "shadow", "wanted"),
+    [(True, False, False, 0.5), (True, True, False, 0.0), (True, True, True, 0.8), (False, True, True, 0.5)],
+    ids=["both off", "seen through", "lit through", "from the front"],
+)
+def test_backs_of_faces_are_culled_as_the_material_says(sheet, tmp_path, turned, camera, shadow, wanted):
+    sheet.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.5, 0.5, 0.5, 1.0)
+    sheet.node_tree.nodes["Principled BSDF"].inputs["Specular IOR Level"].default_value = 0.0
+    sheet.use_backface_culling, sheet.use_backface_culling_shadow = camera, shadow
+    scene = bpy.context.scene
+    bpy.data.objects["Sheet"].rotation_euler.x = np.pi if turned else 0.0
+    scene.camera.location.z = 5
+    found = picture(render(scene, tmp_path / "sheet.exr"))
+    assert found[..., :3].mean() == pytest.approx(wanted, abs=0.02)  # of a sun of pi W/m2
+
+
 def test_light_that_is_added_to_a_transparent_sheet_is_seen(sheet, tmp_path):
     tree, scene = sheet.node_tree, bpy.context.scene
     tree.nodes.clear()

@@ -98,6 +98,14 @@ def test_recoloured_material_marks_who_wears_it():
     assert {box[0, 0] for box in changes.moved_bounds} == {7.0}
 
 
+def test_a_material_that_lamps_see_one_side_of_blocks_light_otherwise():
+    plain, culled = Material("m"), Material("m", culled_by_lamps=True)
+    for old, new, count in ((plain, culled, 2), (culled, plain, 2), (plain, replace(plain, culled=True), 0)):
+        changes = Changes.between(scene(materials=(old,)), scene(materials=(new,)))
+        assert changes.materials and len(changes.moved_bounds) == 2
+        assert len(changes.shape_bounds) == count
+
+
 def test_renumbered_materials_change_instances_but_no_picture():
     old = scene(instance(materials=(0,)), materials=(Material("X"), Material("Y")))
     new = scene(instance(materials=(1,)), materials=(Material("Y"), Material("X")))
