@@ -28,7 +28,7 @@ class Surfaces:
     corners: Array  # (T, 3, 3) float64, world space
     triangle_vertices: Array  # (T, 3) int64: rows of the vertex arrays
     facing: Array  # (T, 3) float64: unit normal of each triangle, on the side of its vertices' normals
-    reflectance: Array  # (T, channels) float64, 0..1: diffuse; one channel where all is grey
+    reflectance: Array  # (T, channels) float64, 0..1: as if scattered; one channel where all is grey
     blocks: Array  # (T,) bool: takes part in shadows
     positions: Array  # (V, 3) float64, world space, lifted off the surface: where rays start
     normals: Array  # (V, 3) float64, world space, unit
@@ -166,7 +166,11 @@ def _facing(corners: Array, normals: Array) -> Array:
 
 
 def _reflectance(mesh: Mesh, instance: Instance, scene: Scene) -> Array:
-    """(T, 3): the part of light that each triangle scatters, a texture averaged over it."""
+    """(T, 3): the part of light that each triangle gives back, a texture averaged over it.
+
+    What a lobe reflects is in it as if it were scattered, by its reflectance at normal incidence: its direction is
+    lost, its energy is not.
+    """
     colours = np.zeros((mesh.triangle_count, 3))
     if not instance.visibility & Visibility.BOUNCE:
         return colours
@@ -176,7 +180,9 @@ def _reflectance(mesh: Mesh, instance: Instance, scene: Scene) -> Array:
         colours[run] = material.base_color if material.base_color_texture is None else 0.0
         if material.base_color_texture is not None:
             colours[run] = _averages(mesh, run, material, scene.images)
-        colours[run] *= (1.0 - material.metallic) * (1.0 - material.layered * np.array(material.specular))
+        scattered = (1.0 - material.metallic) * (1.0 - material.layered * np.array(material.specular))
+        colours[run] *= scattered + material.metallic
+        colours[run] += (1.0 - material.metallic) * np.array(material.specular)
     return colours.clip(0.0, 1.0)
 
 

@@ -1,5 +1,7 @@
 """Diffuse transfer against closed forms: cosine lobe, sphere on a plane, bowl, white furnace."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from rebound.bake import transfer as transfer_module
 from rebound.bake.occlusion import make_caster
 from rebound.bake.surfaces import gather
 from rebound.bake.transfer import Progress, Sampling, diffuse, finish
-from rebound.scene.data import Visibility
+from rebound.scene.data import Material, Visibility
 from rebound.tests.support.bake_scenes import WHITE_SKY, bowl, grid, placed, surfaces_of
 from rebound.tests.support.render_scenes import box, quad, quad_corners, sphere, triangles
 
@@ -78,6 +80,18 @@ def test_white_furnace_tends_to_white():
         assert white(transfer).mean() > before
         before = white(transfer).mean()
     assert np.abs(white(transfer) - 1).max() < 0.005
+
+
+def test_metal_and_glossy_surfaces_pass_all_of_their_light_on():
+    """The furnace again, of white metal, and of white paint below a layer that reflects a twentieth."""
+    plain = placed(grid("floor", 4.0, 8), sphere("ball", (0, 0, 0.6), 0.5, rings=8), albedo=1.0)
+    whites = Material("Metal", (1, 1, 1), metallic=1.0), Material("Paint", (1, 1, 1), specular=(0.05, 0.05, 0.05))
+    for material in whites:
+        _, transfer = transfer_of(replace(plain, materials=(material,)), bounces=16, directions=256)
+        assert np.abs(white(transfer) - 1).max() < 0.005, material.name
+    gold = Material("Gold", (1.0, 0.8, 0.3), metallic=1.0)
+    tinted = white(transfer_of(replace(plain, materials=(gold,)), bounces=1, directions=256)[1]).mean(axis=0)
+    assert tinted[0] > tinted[1] > tinted[2]
 
 
 def test_walls_of_two_triangles_reflect_as_fine_ones_do():
