@@ -206,7 +206,7 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
     if "device" in about:
-        lines.append(f"Rays traced by {about['device']}")
+        lines.append(f"Baked on {about['device']}")
     if "roughness" in about:
         lobe = f"{settings['lobe_terms']} terms of {settings['lobe']}"
         lines.append(f"For roughness {about['roughness']:.2f}: {lobe}, {about['lobe_error']:.0%} of it left out")
