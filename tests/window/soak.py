@@ -17,6 +17,7 @@ from steps import (
     OUT,
     PACKAGE,
     Steps,
+    areas,
     check,
     count_draws,
     finished,
@@ -41,7 +42,8 @@ Memory = tuple[float, float, int]  # MiB of the process, MiB on the GPU, texture
 
 
 def resident() -> float:
-    """MiB of memory that this process has, without what the C library keeps for later."""
+    """MiB of memory that this process has, without what Python and the C library keep for later."""
+    gc.collect()
     ctypes.CDLL(None).malloc_trim(0)
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
@@ -54,14 +56,19 @@ def gpu_mib() -> float:
 
 def live_textures() -> int:
     """Textures of Rebound's that Python still knows."""
-    gc.collect()
     name = module("device.resources").Texture.__name__  # by name: another copy of the class would count too
     textures = (thing for thing in gc.get_objects() if type(thing).__name__ == name)
     return sum(getattr(texture, "handle", None) is not None for texture in textures)
 
 
-def measure() -> Memory:
-    return resident(), gpu_mib(), live_textures()
+def look(found: list[Memory]) -> Steps:
+    """Note the memory, once what was freed is gone from the driver too: it keeps that until a context draws again."""
+    yield from finished()
+    for _ in range(4):
+        for _window, area in areas("VIEW_3D"):
+            area.tag_redraw()
+        yield 0.25
+    found.append((resident(), gpu_mib(), live_textures()))
 
 
 def soak(part: str, times: int, once: Callable[[int], Steps]) -> Steps:
@@ -70,20 +77,18 @@ def soak(part: str, times: int, once: Callable[[int], Steps]) -> Steps:
     for number in range(WARM_UP[part] + times):
         done = number - WARM_UP[part]
         if done >= 0 and done % max(times // LOOKS, 1) == 0:
-            yield from finished()
-            found.append(measure())
+            yield from look(found)
             say(part, done, "resident {:.0f} MiB, GPU {:.1f} MiB, {} textures".format(*found[-1]))
         yield from once(number)
-    yield from finished()
-    found.append(measure())
+    yield from look(found)
     flat(part.replace("_", " "), found, times)
 
 
 def flat(what: str, found: list[Memory], times: int) -> None:
     """Check that the last look saw no more than the first."""
     before, after = found[0], found[-1]
-    resident = ", ".join(f"{look[0]:.0f}" for look in found)
-    say(f"{what}, {times} times: resident {resident} MiB; GPU {before[1]:.1f} -> {after[1]:.1f} MiB, "
+    process = ", ".join(f"{memory[0]:.0f}" for memory in found)
+    say(f"{what}, {times} times: resident {process} MiB; GPU {before[1]:.1f} -> {after[1]:.1f} MiB, "
         f"textures {before[2]} -> {after[2]}")  # fmt: skip
     grown = after[0] / before[0] - 1
     check(f"{what}: the process does not grow", grown < GROWTH, f"{100 * grown:+.1f} %")
