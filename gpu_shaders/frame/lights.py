@@ -75,10 +75,12 @@ def emitter_sample(light: Light, index: int, count_offset: np.ndarray) -> np.nda
 def emitter_points(light: Light, across: float, most: int) -> list[np.ndarray | None]:
     """Points (3,) evenly over an area light, one for each ``across`` metres of both sides but at most ``most``.
 
-    One is its centre, and None.
+    One is its centre, and None; so it is where ``across`` is nothing, in a scene of lights alone.
     """
     half = half_size(light)
-    x, y = (max(math.ceil(2.0 * side / across), 1) for side in half)
+    if across <= 0.0:
+        return [None]
+    x, y = (max(min(math.ceil(2.0 * side / across), most), 1) for side in half)
     while x * y > max(most, 1):
         x, y = (x - 1, y) if x >= y else (x, y - 1)
     if x * y == 1:

@@ -68,7 +68,7 @@ def test_timed_device_renders_the_same_and_names_every_pass(headless_device, clo
     passes = {p.name: p for p in timed.passes()}
     assert passes["frame_gbuffer"].calls == 2
     assert any(name.startswith("rsm_gather") for name in passes)
-    assert passes["vertices"].kind == UPLOAD
+    assert passes["textures"].kind == UPLOAD
     assert {p.kind for p in passes.values()} == {RASTER, UPLOAD}
     assert all(p.milliseconds >= 0 for p in passes.values())
     assert sum(p.milliseconds for p in passes.values()) > 0

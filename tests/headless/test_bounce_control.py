@@ -156,7 +156,7 @@ def test_strength_redraws_its_own_maps_only(studio, method):
         shot(studio, lamps, method, 1, **fields)
         after = studio.renderer.statistics()
         drawn = [int(after[name] - before.get(name, 0)) for name in ("light_maps_drawn", "shadow_maps_drawn")]
-        return (*drawn, dict(studio.gpu_scene.uploads))
+        return (*drawn, dict(+studio.gpu_scene.uploads))
 
     work([KEY, FILL])
     assert work([replace(KEY, bounce=1.5), FILL]) == (1, 0, {})

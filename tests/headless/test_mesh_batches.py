@@ -12,7 +12,7 @@ from rebound.gpu_shaders.frame import batches, mesh_pages
 from rebound.gpu_shaders.frame.draws import draw_scene, visible_draws
 from rebound.gpu_shaders.frame.mesh_pages import MOST_SMALL, pack_normals
 from rebound.gpu_shaders.frame.shaders import GBUFFER
-from rebound.gpu_shaders.prt.shaders import DRAW, PRT_DRAW
+from rebound.gpu_shaders.prt.shaders import DRAW, PRT_DRAW, Look
 from rebound.scene.data import Instance, Material, Visibility
 from rebound.tests.support.glsl_functions import evaluate
 from rebound.tests.support.render_scenes import (
@@ -193,7 +193,7 @@ def test_passes_over_the_g_buffer_have_its_depths_to_the_bit(studio):
     }  # fmt: skip
     packed = PRT_DRAW.pack([block], for_uniform=True)
     state = DrawState(depth_test="EQUAL")
-    device.draw(DRAW[False], vertices, over, state=state, light_tx=light_texture, prt_draw=packed)
+    device.draw(DRAW[Look.MATT], vertices, over, state=state, light_tx=light_texture, prt_draw=packed)
     is_ball = device.read(surfaces.colors[2])[..., 2] > -1.9
     is_ball &= device.read(surfaces.colors[0])[..., 3] > 0.0
     is_hit = device.read(over.colors[1])[..., 0] > 0.0

@@ -329,6 +329,7 @@ def test_points_of_an_area_light_lie_evenly_on_it():
 
     sizes = [len(points(most, area_shape="RECTANGLE")) for most in (9, 6, 0)]
     assert sizes == [8, 6, 1]
+    assert emitter_points(light("AREA", area_size=(4.0, 4.0)), 0.0, 9) == [None]
     rectangle = points(9, area_shape="RECTANGLE")
     np.testing.assert_allclose(rectangle.mean(0), 0.0, atol=1e-12)
     assert sorted(set(np.abs(rectangle[:, :2]).ravel().round(6))) == [0.475, 0.5, 1.5]
