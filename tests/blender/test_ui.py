@@ -127,7 +127,7 @@ METHODS = [item.key for setting in SETTINGS if setting.name == "method" for item
 
 def test_every_setting_has_a_row(rebound_scene):
     drawn = {name for method in METHODS for name in shown(rebound_scene, method)}
-    for kind in ("GLOSSY", "WAVELET"):
+    for kind in ("GLOSSY", "WAVELET", "WAVELET_GLOSSY"):
         rebound_scene.rebound.bake_kind = kind
         drawn |= set(shown(rebound_scene, "NONE"))
     names = {p.identifier for p in rebound_scene.rebound.bl_rna.properties} - {"rna_type", "name"}
