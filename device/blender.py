@@ -56,8 +56,7 @@ class BlenderDevice(Device):
         self._backend = backend
         self.name = f"{ {'OPENGL': 'OpenGL', 'VULKAN': 'Vulkan', 'METAL': 'Metal'}.get(backend, backend) } {renderer}"
         # Blender wants a vertex buffer even where a shader has no attributes.
-        self._attributeless_buffers = [gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=3)]
-        self._attributeless: dict = {None: _batch(self._attributeless_buffers)}
+        self._attributeless: Any = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=3)])
         self._pixel: Texture | None = None
         self._bound: Any = None
         self._context = 0
@@ -72,7 +71,7 @@ class BlenderDevice(Device):
 
     def close(self) -> None:
         """Drop the device's own buffers. Programs stay: they are Blender's for as long as the extension is enabled."""
-        self._attributeless_buffers, self._attributeless = [], {}
+        self._attributeless = None
         self.free(self._pixel)
         self._pixel = None
 
@@ -98,11 +97,7 @@ class BlenderDevice(Device):
     # --- resources ---------------------------------------------------------------------------------------------------
 
     def _create_texture(self, texture: Texture, data: np.ndarray | None) -> None:
-        if texture.repeat and not _HAS_SAMPLER_STATE:
-            raise DeviceError("Blender before 5.2 cannot repeat a texture: read it by texelFetch")
         options: dict[str, Any] = {"format": _FORMATS.get(texture.format, texture.format)}
-        if texture.layers:
-            options["layers"] = texture.layers
         is_integer = texture.info.scalar != "FLOAT"
         if data is not None and not is_integer:
             values = blender_convert.upload_values(texture, data, encodes_srgb=_IS_4_5 and self._backend == "VULKAN")
@@ -112,8 +107,8 @@ class BlenderDevice(Device):
         except (RuntimeError, MemoryError) as error:
             raise DeviceError(f"No GPU memory for {texture}: {error}") from error
         if _HAS_SAMPLER_STATE and not is_integer and not texture.info.is_depth:
-            texture.handle.filter_mode(texture.filter == "LINEAR")
-            texture.handle.extend_mode("REPEAT" if texture.repeat else "EXTEND")
+            texture.handle.filter_mode(False)
+            texture.handle.extend_mode("EXTEND")
         if data is None:  # Vulkan leaves garbage in it
             self._fill(texture, (0.0, 0.0, 0.0, 0.0))
         elif is_integer:
@@ -227,21 +222,16 @@ class BlenderDevice(Device):
             self._barrier()
 
     def _draw(self, program: Program, vertices: Vertices | None, first: int, count: int, instances: int) -> None:
-        if vertices is None:
-            cache, buffers, whole = self._attributeless, self._attributeless_buffers, -1
-        else:
-            cache, buffers, whole = vertices.cache, vertices.handle, vertices.count
-        batch = cache.get(None)
+        batch = self._attributeless if vertices is None else vertices.cache.get(None)
         if batch is None:
             raise ValueError(f"Shader {program.shader.name}: the vertices were freed")
-        cache[program] = True  # its inputs were checked
+        if vertices is not None:
+            vertices.cache[program] = True  # its inputs were checked
         if instances == 1:
             batch.draw_range(program.handle, elem_start=first, elem_count=count)
             return
-        if vertices is None and not first:
+        if vertices is None:
             batch = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=count)])
-        elif count != whole:
-            batch = _indexed(cache, buffers, first, count)
         batch.draw_instanced(program.handle, instance_start=0, instance_count=instances)
 
     def _dispatch(self, program: Program, groups: tuple[int, int, int], resources: Mapping[str, Any]) -> None:
@@ -291,20 +281,11 @@ def _set_state(state: DrawState) -> None:
     gpu.state.color_mask_set(True, True, True, True)
 
 
-def _batch(buffers: Sequence[Any], **options: Any) -> Any:
-    batch = gpu.types.GPUBatch(type="TRIS", buf=buffers[0], **options)
+def _batch(buffers: Sequence[Any]) -> Any:
+    batch = gpu.types.GPUBatch(type="TRIS", buf=buffers[0])
     for buffer in buffers[1:]:
         batch.vertbuf_add(buffer)
     return batch
-
-
-def _indexed(cache: dict, buffers: Sequence[Any], first: int, count: int) -> Any:
-    """A batch of some corners: instanced drawing takes no range. gl_VertexID stays the corner's own number."""
-    key = (first, count)
-    if key not in cache:
-        corners = np.arange(first, first + count, dtype=np.int32)
-        cache[key] = _batch(buffers, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=corners.reshape(-1, 3)))
-    return cache[key]
 
 
 def _create_info(shader: Shader, texts: Mapping[str, str], backend: str) -> Any:

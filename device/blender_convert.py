@@ -1,4 +1,4 @@
-"""What Blender cannot upload or read back itself, done by a draw: integers, volumes and arrays."""
+"""What Blender cannot upload or read back itself, done by a draw: integers and volumes."""
 
 from typing import TYPE_CHECKING
 
@@ -46,7 +46,7 @@ def read(device: "BlenderDevice", texture: Texture) -> np.ndarray:
     info, shape = texture.info, texture.shape
     if len(shape) == 3 and info.scalar != "INT":
         return read_direct(texture, info.dtype).reshape(shape)
-    # Signed integers read back as garbage, volumes and arrays as their first slice: copy slice by slice.
+    # Signed integers read back as garbage, volumes as their first slice: copy slice by slice.
     bits = info.scalar != "FLOAT"
     slices = shape[0] if len(shape) == 4 else 1
     copy = device.texture(texture.size[:2], "R32UI" if bits else "RGBA32F")

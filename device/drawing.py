@@ -89,7 +89,8 @@ class Drawing:
                  **resources: Any) -> None:  # fmt: skip
         """Draw ``count`` vertices (all that follow ``first``) ``instances`` times; gl_InstanceID counts from 0.
 
-        ``vertices`` None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone.
+        ``vertices`` None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone. Instances
+        are of all that there is: Blender's instanced drawing takes no range.
         """
         program = self._program
         if resources.keys() != self._rest:
@@ -109,6 +110,10 @@ class Drawing:
                 )
         if count % 3:
             raise ValueError(f"Shader {program.shader.name}: {count} corners are not whole triangles")
+        if instances > 1 and (first or (vertices is not None and count != vertices.count)):
+            raise ValueError(
+                f"Shader {program.shader.name}: corners {first}..{first + count} have no instances of their own"
+            )
         if count and instances:
             self._device._draw(program, vertices, first, count, instances)
 

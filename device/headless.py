@@ -78,16 +78,13 @@ class HeadlessDevice(Device):
             handle.compare_func = ""  # read plain depths, not comparisons
         elif len(size) == 3:
             handle = self._ctx.texture3d(size, info.channels, content, alignment=1, dtype=dtype)
-        elif texture.layers:
-            handle = self._ctx.texture_array((*size, texture.layers), info.channels, content, alignment=1, dtype=dtype)
         else:
             internal = {"internal_format": _GL_SRGB8_ALPHA8} if format == "SRGB8_A8" else {}
             handle = self._ctx.texture(size, info.channels, content, alignment=1, dtype=dtype, **internal)
-        linear = texture.filter == "LINEAR" and info.scalar == "FLOAT" and not info.is_depth
-        handle.filter = (moderngl.LINEAR, moderngl.LINEAR) if linear else (moderngl.NEAREST, moderngl.NEAREST)
-        handle.repeat_x = handle.repeat_y = texture.repeat
+        handle.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        handle.repeat_x = handle.repeat_y = False
         if len(size) == 3:
-            handle.repeat_z = texture.repeat
+            handle.repeat_z = False
         texture.handle = handle
 
     def _create_target(self, target: Target) -> None:

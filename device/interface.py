@@ -43,25 +43,21 @@ class Device(ABC):
 
     # --- resources ---------------------------------------------------------------------------------------------------
 
-    def texture(self, size: Sequence[int], format: str, data: np.ndarray | None = None, *, layers: int = 0,
-                filter: str = "NEAREST", repeat: bool = False) -> Texture:  # fmt: skip
-        """A texture of (w, h) or (w, h, d) texels, or an array of ``layers``; zero unless ``data`` is given.
+    def texture(self, size: Sequence[int], format: str, data: np.ndarray | None = None) -> Texture:
+        """A texture of (w, h) or (w, h, d) texels; zero unless ``data`` is given.
 
-        data: (h, w, c), (d, h, w, c) or (layers, h, w, c), row 0 at the bottom; float32 (also float16), for 8-bit
-        formats uint8 or floats in [0, 1], for R32UI uint32, for R32I int32. A depth texture starts at 0 too: clear it.
-        filter, repeat: what GLSL's ``texture()`` does; texelFetch ignores both. Blender below 5.2 cannot be told: it
-        filters floats LINEAR and clamps, so read NEAREST textures by texelFetch; ``repeat`` raises DeviceError.
+        data: (h, w, c) or (d, h, w, c), row 0 at the bottom; float32 (also float16), for 8-bit formats uint8 or floats
+        in [0, 1], for R32UI uint32, for R32I int32. A depth texture starts at 0 too: clear it.
+        Read by texelFetch: GLSL's ``texture()`` filters floats in Blender below 5.2, and takes the nearest elsewhere.
         Raises ValueError for a size, format, shape or dtype that does not fit.
         """
         size = tuple(int(n) for n in size)
         if format not in FORMATS:
             raise ValueError(f"texture format {format!r} is none of {', '.join(FORMATS)}")
         limit = _MAX_VOLUME_SIZE if len(size) == 3 else self.max_texture_size
-        if len(size) not in (2, 3) or min(size) < 1 or max(size) > limit or not 0 <= layers <= _MAX_VOLUME_SIZE:
-            raise ValueError(f"texture size {size} (layers {layers}) is not possible; at most {limit} texels a side")
-        if filter not in ("NEAREST", "LINEAR"):
-            raise ValueError(f"texture filter {filter!r} is neither NEAREST nor LINEAR")
-        texture = Texture(size, format, layers, filter, repeat)
+        if len(size) not in (2, 3) or min(size) < 1 or max(size) > limit:
+            raise ValueError(f"texture size {size} is not possible; at most {limit} texels a side")
+        texture = Texture(size, format)
         self._create_texture(texture, None if data is None else check_data(texture, data))
         self._made.add(texture)
         return texture

@@ -17,25 +17,20 @@ class DeviceError(RuntimeError):
 
 
 class Texture:
-    """A texture on the device: ``size`` (w, h) or (w, h, d), ``format``, ``layers`` (0: not an array)."""
+    """A texture on the device: ``size`` (w, h) or (w, h, d), ``format``."""
 
-    def __init__(
-        self, size: tuple[int, ...], format: str, layers: int = 0, filter: str = "NEAREST", repeat: bool = False
-    ):
-        self.size, self.format, self.layers = size, format, layers
-        self.filter, self.repeat = filter, repeat
+    def __init__(self, size: tuple[int, ...], format: str):
+        self.size, self.format = size, format
         self.info: Format = FORMATS[format]
-        dimension = "3D" if len(size) == 3 else "2D_ARRAY" if layers else "2D"
         #: What a sampler or an image must be declared as.
-        self.kind = f"{self.info.scalar}_{dimension}"
+        self.kind = f"{self.info.scalar}_{len(size)}D"
         #: The backend's own object; None once freed.
         self.handle: Any = None
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The numpy shape of its contents: (h, w, c), (d, h, w, c) or (layers, h, w, c)."""
-        outer = (self.layers,) if self.layers else ()
-        return (*outer, *reversed(self.size), self.info.channels)
+        """The numpy shape of its contents: (h, w, c) or (d, h, w, c)."""
+        return (*reversed(self.size), self.info.channels)
 
     @property
     def bytes(self) -> int:
@@ -43,7 +38,7 @@ class Texture:
         return math.prod(self.shape[:-1]) * self.info.bytes
 
     def __repr__(self) -> str:
-        return f"Texture({self.size}, {self.format!r}{f', layers={self.layers}' if self.layers else ''})"
+        return f"Texture({self.size}, {self.format!r})"
 
 
 class Target:

@@ -27,7 +27,7 @@ def glsl_type(name: str) -> str:
 
 
 def sampler_type(name: str) -> str:
-    """ "UINT_2D_ARRAY" to "usampler2DArray"."""
+    """ "UINT_3D" to "usampler3D"."""
     return _texture_type(name, "sampler")
 
 
@@ -38,7 +38,7 @@ def image_type(name: str) -> str:
 
 def _texture_type(name: str, kind: str) -> str:
     scalar, dimension = name.split("_", 1)
-    return _PREFIX[scalar] + kind + {"2D": "2D", "3D": "3D", "2D_ARRAY": "2DArray"}[dimension]
+    return _PREFIX[scalar] + kind + dimension
 
 
 def complete(shader: "Shader", stage: str) -> Source:

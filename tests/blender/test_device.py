@@ -2,13 +2,12 @@
 
 import weakref
 
-import bpy
 import gpu
 import numpy as np
 import pytest
 
 import rebound
-from rebound.device import DeviceError, DrawState, blender
+from rebound.device import DrawState, blender
 from rebound.device.blender import BlenderDevice
 from rebound.gpu_shaders import all_shaders
 from rebound.tests.support.device_contract import *  # noqa: F403
@@ -86,12 +85,12 @@ def test_failure_before_a_draw_leaves_framebuffer_and_device_alone(device, scree
 def test_closed_device_holds_nothing():
     device = BlenderDevice()
     device.finish()
-    held = [weakref.ref(device._pixel), *device._attributeless_buffers]
-    assert held[0]() is not None and len(held) == 2
+    pixel = weakref.ref(device._pixel)
+    assert pixel() is not None and device._attributeless is not None
     device.close()
     device.close()
-    assert not held[0]() and device.allocated_bytes == 0
-    assert not any(getattr(device, name) for name in ("_attributeless_buffers", "_attributeless", "_pixel", "_bound"))
+    assert not pixel() and device.allocated_bytes == 0
+    assert not any(getattr(device, name) for name in ("_attributeless", "_pixel", "_bound"))
 
 
 def test_no_shader_is_bound_when_the_extension_is_disabled(device, monkeypatch):
@@ -110,14 +109,3 @@ def test_declared_shader_compiles(device, shader):
 def test_programs_outlive_a_device(device):
     show(device, FADE, pc_blue=1.0)
     assert BlenderDevice()._program(FADE) is device._program(FADE)
-
-
-def test_repeat_is_refused_where_blender_cannot(device):
-    if bpy.app.version >= (5, 2):
-        texture = device.texture((2, 1), "R32F", np.array([[1.0, 2.0]], np.float32), repeat=True)
-        shader = fragment("repeat", "void main() { out_color = texture(a_tx, vec2(1.25, 7.5)); }",
-                          samplers={"a_tx": "FLOAT_2D"})  # fmt: skip
-        assert show(device, shader, a_tx=texture)[0, 0, 0] == 1.0
-    else:
-        with pytest.raises(DeviceError, match="repeat"):
-            device.texture((2, 1), "R32F", repeat=True)
