@@ -5,6 +5,7 @@ import numpy as np
 from ...scene.data import View
 
 STRIDES = {"FULL": 1, "HALF": 2, "QUARTER": 4, "EIGHTH": 8}  # pixels from one that gathers to the next
+COARSEST = max(STRIDES.values())
 
 
 def grid_size(view: View, stride: int) -> tuple[int, int]:

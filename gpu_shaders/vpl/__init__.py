@@ -98,7 +98,7 @@ class Vpl:
     @property
     def provisional(self) -> bool:
         """See ``Technique.provisional``."""
-        return self.sources.pending > 0 or self.gathering.settles
+        return self.sources.pending > 0 or self.gathering.provisional
 
     def view(
         self, key: str, inputs: FrameInputs, settings: Mapping[str, Value], target: Target, light: int = 0
@@ -107,7 +107,7 @@ class Vpl:
         if not self.sources.tiles:
             return
         if key == "VPL_HISTORY":
-            self.gathering.view_history(settings, target)
+            self.gathering.view_history(target)
         elif key == "VPL_RESOLUTION":
             self.gathering.view_resolution(inputs, target)
         elif key == "VPL_BOUND":

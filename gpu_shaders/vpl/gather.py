@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...device.interface import Device, Target, Texture
-from ..frame.coarse_grid import STRIDES, grid_offset, grid_size
+from ..frame.coarse_grid import COARSEST, STRIDES, grid_offset, grid_size
 from ..frame.inputs import FrameInputs, LightTargets
 from ..frame.voxels import VOXEL_SAMPLERS
 from ..technique import Value
-from .filtering import AtrousFilter, Upsampling
+from .filtering import Upsampling
+from .memory import Memory
 from .reflections import Reflections
 from .shaders import (
     ATLAS_SAMPLERS,
@@ -29,6 +30,8 @@ from .structs import OLD_VIEW
 # Samples that the mean of a surface's light may stand for: while it is only the view that moves, and after something in
 # the scene did. A still view's mean grows without end.
 LONG_HISTORY, SHORT_HISTORY, ENDLESS = 24.0, 1.0, 1e6
+# and where it is from a coarser picture, of a view that came to rest: detail is to come soon.
+COARSE_HISTORY = 4.0
 # Samples after an edit, that of the edit included, whose mean stays short and still holds light of before; longer
 # while the cache does. They are provisional: once they are over, means and the picture begin anew, or a bright light
 # that went out would stay to be seen for good.
@@ -54,63 +57,22 @@ class PoolState:
     settles: bool
 
 
-@dataclass(eq=False)
-class _Grid:
-    """Textures of one grid of gathering pixels. Those in pairs have the newest first.
-
-    Direct light that the gathering found is a part of its light; ``emitted`` and ``direct_histories`` keep it apart,
-    empty where there is none.
-    """
-
-    size: tuple[int, int]
-    first_hand: bool
-    surfaces: list[Texture]
-    gathered: list[Texture]
-    reservoirs: list[Texture]
-    histories: list[Texture]
-    emitted: list[Texture]
-    direct_histories: list[Texture]
-    gather_targets: list[Target]
-    reuse_targets: list[Target]
-    filter: AtrousFilter
-
-    @property
-    def resources(self) -> tuple[Texture | Target, ...]:
-        return (
-            *self.gather_targets,
-            *self.reuse_targets,
-            *self.filter.resources,
-            *self.surfaces,
-            *self.gathered,
-            *self.reservoirs,
-            *self.histories,
-            *self.emitted,
-            *self.direct_histories,
-        )
-
-    def turn(self) -> None:
-        """Make what is newest the picture before."""
-        for pair in (
-            self.surfaces,
-            self.gather_targets,
-            self.reservoirs,
-            self.histories,
-            self.direct_histories,
-            self.reuse_targets,
-        ):
-            pair.reverse()
-
-
 @dataclass(frozen=True)
 class _Before:
     """What the picture before was made of."""
 
     clip_from_world: np.ndarray
+    projection: np.ndarray
     size: tuple[int, int]
     offset: tuple[int, int]
     stride: int
     scene_revision: int
     sources_revision: int
+
+    def sees_other(self, inputs: FrameInputs) -> bool:
+        """Whether view or scene have changed since."""
+        same_view = np.array_equal(self.projection, _projection(inputs))
+        return not same_view or self.scene_revision != inputs.gpu_scene.revision
 
     def block(self) -> np.ndarray:
         row = {
@@ -127,10 +89,11 @@ class Gathering:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._grid: _Grid | None = None
+        self._memory = Memory(device)
         self._reflections = Reflections(device)
         self._before: _Before | None = None
         self._drawn: _Before | None = None  # the newest picture, reused or not
+        self.is_coarse = False  # whether the newest sample was made in haste
         self._whole = True  # whether the newest sample came to its end
         self._settling = 0  # samples to come whose mean stays short
 
@@ -146,13 +109,14 @@ class Gathering:
 
         ``candidates``: what vpl_candidates_lib.glsl reads.
         """
-        stride = STRIDES[str(settings["scale"])]
+        stride = self._stride(inputs, settings)
         offset = grid_offset(inputs.seed, about.number, stride)
         reuses, glossy = bool(settings["reuse"]), inputs.gpu_scene.is_glossy
-        grid = self._fitting(inputs, stride, reuses and about.first_hand)
+        first_hand = reuses and about.first_hand
+        memory = self._begin(inputs, stride, first_hand)
         self.device.fullscreen(
-            GATHER_TO_REUSE[glossy, grid.first_hand] if reuses else GATHER[glossy],
-            grid.gather_targets[0],
+            GATHER_TO_REUSE[glossy, first_hand] if reuses else GATHER[glossy],
+            memory.target(memory.new["surface"], *memory.scratch.values()),
             normal_tx=inputs.gbuffer.normal,
             **candidates,
             pc_stride=stride,
@@ -160,26 +124,26 @@ class Gathering:
         )
         yield GATHER_DONE
         now = self._now(inputs, stride, offset, about.sources_revision)
-        up = Upsampling(self.device, inputs, grid.surfaces[0], stride, offset)
+        surface = memory.new["surface"]
+        up = Upsampling(self.device, inputs, surface, stride, offset)
         if reuses:
             history, reuse = self._most(inputs, now, about.settles)
-            self._reuse(inputs, grid, candidates, now, history, reuse)
-            light, direct = grid.filter.light[0], grid.direct_histories[:1]
+            self._reuse(inputs, candidates, now, history, reuse)
+            light, direct = memory.filter.light[0], [memory.new["direct_history"]] if first_hand else []
             if settings["denoise"]:
-                light, direct = grid.filter.run(grid.surfaces[0], direct)
+                light, direct = memory.filter.run(surface, direct)
             up.share_out(light, direct, targets.diffuse_indirect, targets.diffuse_direct)
         else:
             history = 0.0
-            indirect, direct = grid.gathered
-            up.cover(indirect, targets.diffuse_indirect)
-            up.add(direct, targets.diffuse_direct)
+            up.cover(memory.scratch["light"], targets.diffuse_indirect)
+            up.add(memory.scratch["rest"], targets.diffuse_direct)
         inputs.mark("gather")
         if glossy:
             yield FILTER_DONE
             self._reflections.draw(
                 inputs,
                 candidates,
-                grid.size,
+                memory.size,
                 stride,
                 offset,
                 (self._before or now).block(),
@@ -195,9 +159,9 @@ class Gathering:
         self._whole = True
 
     @property
-    def settles(self) -> bool:
-        """Whether the means still hold light of before an edit."""
-        return self._settling > 0
+    def provisional(self) -> bool:
+        """Whether the means still hold light of before an edit, or few pixels gathered in haste."""
+        return self._settling > 0 or self.is_coarse
 
     def view_bound(self, inputs: FrameInputs, candidates: Mapping[str, Any], target: Target) -> None:
         """Draw the light that the bound takes away, as this sample found it."""
@@ -220,33 +184,32 @@ class Gathering:
 
     def view_resolution(self, inputs: FrameInputs, target: Target) -> None:
         """Draw which pixels gathered, and how well they do for the others."""
-        assert self._grid is not None and self._drawn is not None
+        assert self._drawn is not None
         self.device.fullscreen(
             VIEW_RESOLUTION,
             target,
             position_tx=inputs.gbuffer.position,
             normal_tx=inputs.gbuffer.normal,
-            surface_tx=self._grid.surfaces[0],
+            surface_tx=self._memory.new["surface"],
             pc_stride=self._drawn.stride,
             pc_offset=self._drawn.offset,
         )
 
-    def view_history(self, settings: Mapping[str, Value], target: Target) -> None:
+    def view_history(self, target: Target) -> None:
         """Draw how many samples each pixel's mean stands for."""
-        assert self._grid is not None
-        stride = STRIDES[str(settings["scale"])]
-        history = self._grid.histories[0]
+        assert self._drawn is not None
+        history = self._memory.new["history"]
+        stride = self._drawn.stride
         self.device.fullscreen(VIEW_HISTORY, target, history_tx=history, pc_stride=stride, pc_many=LONG_HISTORY)
 
     def forget(self) -> None:
         """Know nothing of the picture before."""
-        self._before, self._settling = None, 0
+        self._before, self._settling, self.is_coarse = None, 0, False
 
     def free(self) -> None:
-        for resource in self._grid.resources if self._grid else ():
-            self.device.free(resource)
+        self._memory.free()
         self._reflections.free()
-        self._grid = self._before = self._drawn = None
+        self._before = self._drawn = None
 
     def _most(self, inputs: FrameInputs, now: _Before, pool_settles: bool) -> tuple[float, float]:
         """Samples that the mean of a surface's light may stand for, and a reservoir of the picture before."""
@@ -262,6 +225,8 @@ class Gathering:
         if self._settling == 0 and not settled_before:
             return 0.0, 0.0
         history = SHORT_HISTORY if self._settling else ENDLESS if still else LONG_HISTORY
+        if before.stride > now.stride:
+            history = min(history, COARSE_HISTORY)
         # Samples of a still view are to be independent, or their mean would converge more slowly.
         reuse = 0.0 if still or before.sources_revision != now.sources_revision else MOST_REUSE
         return history, reuse
@@ -269,67 +234,69 @@ class Gathering:
     def _reuse(
         self,
         inputs: FrameInputs,
-        grid: _Grid,
         candidates: Mapping[str, Any],
         now: _Before,
         history: float,
         reuse: float,
     ) -> None:
+        new, old, scratch = self._memory.new, self._memory.old, self._memory.scratch
+        light = self._memory.filter.light[0]
+        first_hand = "direct_history" in new
+        target = self._memory.target(new["reservoir"], new["history"], light)
         direct: dict[str, Texture] = {}
-        if grid.first_hand:
-            direct = {"emitted_tx": grid.emitted[0], "direct_history_tx": grid.direct_histories[1]}
+        if first_hand:
+            target = self._memory.target(new["reservoir"], new["history"], light, new["direct_history"])
+            direct = {"emitted_tx": scratch["emitted"], "direct_history_tx": old["direct_history"]}
         self.device.fullscreen(
-            REUSE[inputs.gpu_scene.is_glossy, grid.first_hand],
-            grid.reuse_targets[0],
+            REUSE[inputs.gpu_scene.is_glossy, first_hand],
+            target,
             **direct,
             **{name: candidates[name] for name in REUSE_READS},
-            surface_tx=grid.surfaces[0],
-            reservoir_tx=grid.gathered[0],
-            rest_tx=grid.gathered[1],
-            old_surface_tx=grid.surfaces[1],
-            old_reservoir_tx=grid.reservoirs[1],
-            history_tx=grid.histories[1],
+            surface_tx=new["surface"],
+            reservoir_tx=scratch["light"],
+            rest_tx=scratch["rest"],
+            old_surface_tx=old["surface"],
+            old_reservoir_tx=old["reservoir"],
+            history_tx=old["history"],
             old_view=(self._before or now).block(),
             pc_most_reuse=reuse,
             pc_most_history=history,
         )
 
+    def _stride(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> int:
+        """Pixels from one that gathers to the next: more where another picture will show the same better."""
+        stride, before = STRIDES[str(settings["scale"])], self._drawn
+        self.is_coarse = (
+            bool(settings["coarser_in_motion"])
+            and inputs.follows
+            and inputs.sample == 0
+            and before is not None
+            and stride < COARSEST
+            and before.sees_other(inputs)
+        )
+        return 2 * stride if self.is_coarse else stride
+
     def _now(self, inputs: FrameInputs, stride: int, offset: tuple[int, int], sources_revision: int) -> _Before:
         size = (inputs.view.width, inputs.view.height)
-        return _Before(inputs.clip_from_world, size, offset, stride, inputs.gpu_scene.revision, sources_revision)
+        revision = inputs.gpu_scene.revision
+        return _Before(inputs.clip_from_world, _projection(inputs), size, offset, stride, revision, sources_revision)
 
-    def _fitting(self, inputs: FrameInputs, stride: int, first_hand: bool) -> _Grid:
-        """The grid of this picture's size, turned so that the picture before is the older of each pair."""
-        size = grid_size(inputs.view, stride)
-        if self._grid is None or (self._grid.size, self._grid.first_hand) != (size, first_hand):
-            self.free()
-            self._grid = _new_grid(self.device, size, first_hand)
-        if self._whole:  # what a cancelled sample left is written over: the picture before is still the older
-            self._grid.turn()
+    def _begin(self, inputs: FrameInputs, stride: int, first_hand: bool) -> Memory:
+        """Textures of this picture's size. What a cancelled sample left is written over."""
+        apart = ("direct_history",) if first_hand else ()
+        knows_before = self._memory.begin(
+            grid_size(inputs.view, stride),
+            ("surface", "reservoir", "history", *apart),
+            ("light", "rest", *(("emitted",) if first_hand else ())),
+            direct_apart=first_hand,
+            turn=self._whole,
+        )
+        if not knows_before:
+            self._before = None
         self._whole = False
-        return self._grid
+        return self._memory
 
 
-def _new_grid(device: Device, size: tuple[int, int], first_hand: bool) -> _Grid:
-    def pair(wanted: bool = True) -> list[Texture]:
-        return [device.texture(size, "RGBA32F") for _ in range(2 * wanted)]
-
-    surfaces, gathered, reservoirs, histories, direct_histories = pair(), pair(), pair(), pair(), pair(first_hand)
-    emitted = [device.texture(size, "RGBA32F")] if first_hand else []
-    atrous = AtrousFilter(device, size, direct_apart=first_hand)
-    return _Grid(
-        size,
-        first_hand,
-        surfaces,
-        gathered,
-        reservoirs,
-        histories,
-        emitted,
-        direct_histories,
-        [device.target([surface, *gathered, *emitted]) for surface in surfaces],
-        [
-            device.target([reservoirs[i], histories[i], atrous.light[0], *direct_histories[i : i + 1]])
-            for i in range(len(reservoirs))
-        ],
-        atrous,
-    )
+def _projection(inputs: FrameInputs) -> np.ndarray:
+    """(4, 4) of the view, without the sample's offset inside the pixel."""
+    return inputs.view.clip_from_view @ inputs.view.view_from_world

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...device.interface import Device, Target, Texture
+from ...device.interface import Device
 from ..frame.inputs import FrameInputs, LightTargets
-from .filtering import AtrousFilter, Upsampling
+from .filtering import Upsampling
+from .memory import Memory
 from .shaders import REFLECT, REFLECT_MEAN
 
 
@@ -18,8 +19,7 @@ class Reflections:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._size = (0, 0)
-        self._resources: tuple[Texture | Target, ...] = ()
+        self._memory = Memory(device)
 
     def draw(
         self,
@@ -38,13 +38,15 @@ class Reflections:
         """Add what this sample finds. ``old_view``: OLD_VIEW of the picture before; ``mean``: whether that counts, for
         at most ``most_history`` samples; ``denoise``: whether the filter runs over it.
         """
-        if self._fit(size):
+        kept, scratch = ("surface", "history", "direct_history"), ("indirect", "direct")
+        memory = self._memory
+        if not memory.begin(size, kept, scratch, direct_apart=True, turn=True):
             most_history = 0.0  # the picture before showed nothing glossy
-        self._turn()
-        surface, old_surface = self._surfaces
+        new, old, rays = memory.new, memory.old, memory.scratch
+        surface = new["surface"]
         self.device.fullscreen(
             REFLECT,
-            self._ray_targets[0],
+            memory.target(surface, *rays.values()),
             normal_tx=inputs.gbuffer.normal,
             specular_color_tx=inputs.gbuffer.specular,
             environment_tx=inputs.gpu_scene.environment.texture,
@@ -54,53 +56,26 @@ class Reflections:
         )
         up = Upsampling(self.device, inputs, surface, stride, offset, glossy=True)
         if not mean:
-            up.cover(self._rays[0], targets.glossy_indirect)
-            up.add(self._rays[1], targets.glossy_direct)
+            up.cover(rays["indirect"], targets.glossy_indirect)
+            up.add(rays["direct"], targets.glossy_direct)
             return
         self.device.fullscreen(
             REFLECT_MEAN,
-            self._mean_targets[0],
+            memory.target(new["history"], memory.filter.light[0], new["direct_history"]),
             surface_tx=surface,
-            indirect_tx=self._rays[0],
-            direct_tx=self._rays[1],
-            old_surface_tx=old_surface,
-            history_tx=self._histories[1],
-            direct_history_tx=self._direct_histories[1],
+            indirect_tx=rays["indirect"],
+            direct_tx=rays["direct"],
+            old_surface_tx=old["surface"],
+            history_tx=old["history"],
+            direct_history_tx=old["direct_history"],
             old_view=old_view,
             pc_most_history=most_history,
             pc_still=int(inputs.sample > 0),
         )
-        light, direct = self._filter.light[0], self._direct_histories[:1]
+        light, direct = memory.filter.light[0], [new["direct_history"]]
         if denoise:
-            light, direct = self._filter.run(surface, direct)
+            light, direct = memory.filter.run(surface, direct)
         up.share_out(light, direct, targets.glossy_indirect, targets.glossy_direct)
 
     def free(self) -> None:
-        for resource in self._resources:
-            self.device.free(resource)
-        self._size, self._resources = (0, 0), ()
-
-    def _fit(self, size: tuple[int, int]) -> bool:
-        """Have textures of this size; whether they are new, and hold nothing yet."""
-        if size == self._size:
-            return False
-        self.free()
-
-        def pair() -> list[Texture]:
-            return [self.device.texture(size, "RGBA32F") for _ in range(2)]
-
-        # Those in pairs have the newest first; the rays are indirect and direct light.
-        self._surfaces, self._rays, self._histories, self._direct_histories = pair(), pair(), pair(), pair()
-        self._filter = AtrousFilter(self.device, size, direct_apart=True)
-        self._ray_targets = [self.device.target([surface, *self._rays]) for surface in self._surfaces]
-        both = zip(self._histories, self._direct_histories, strict=True)
-        self._mean_targets = [self.device.target([mean, self._filter.light[0], direct]) for mean, direct in both]
-        textures = (*self._surfaces, *self._rays, *self._histories, *self._direct_histories)
-        self._resources = (*self._ray_targets, *self._mean_targets, *self._filter.resources, *textures)
-        self._size = size
-        return True
-
-    def _turn(self) -> None:
-        """Make what is newest the picture before."""
-        for pair in (self._surfaces, self._ray_targets, self._histories, self._direct_histories, self._mean_targets):
-            pair.reverse()
+        self._memory.free()

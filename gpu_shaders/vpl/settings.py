@@ -19,6 +19,14 @@ SETTINGS = (
         ),
     ),
     Setting(
+        "coarser_in_motion",
+        "BOOL",
+        "Coarser in Motion",
+        "In viewports, half the resolution of bounced light along each side in pictures of a view or scene that "
+        "changed; the picture sharpens as soon as it rests. Off is as sharp in motion, at the cost of fluency",
+        True,
+    ),
+    Setting(
         "resolution",
         "INT",
         "Map Resolution",

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rebound.gpu_shaders.vpl.gather import COARSE_HISTORY
 from rebound.scene.data import Material, World
 from rebound.settings import Settings
 from rebound.tests.support.render_scenes import QUICK, Studio, box, light, ortho, place, quad, scene
@@ -164,6 +165,38 @@ def test_picture_without_lights_is_waited_for_once(studio):
         for _ in studio.renderer.sample(frame, studio.gpu_scene, VIEW, settings):
             pass
     assert not frame.provisional
+    studio.renderer.free_frame(frame)
+
+
+def test_moving_view_gathers_coarsely_and_sharpens_at_rest(studio):
+    """A picture in haste is not summed with those that follow, yet they know what it found."""
+    frame = studio.renderer.begin(VIEW, ("combined",))
+    studio.show(picture())
+
+    def sample(at, restart, **changed):
+        """(gathering pixels, whether the picture is in haste, its samples, what its means stand for) after one."""
+        if restart:
+            studio.renderer.restart(frame)
+        view = ortho(8, 8, 2, (5 + at, 0, 10), (5 + at, 0, 0))
+        settings = Settings.defaults(**{**QUICK, **VPL, "vpl_reuse": True, **changed})
+        for _ in studio.renderer.sample(frame, studio.gpu_scene, view, settings):
+            pass
+        memory = studio.renderer._techniques["vpl"].gathering._memory
+        means = studio.device.read(memory.new["history"])[..., 3]
+        return memory.size, frame.provisional, frame.samples, float(means.mean())
+
+    assert sample(0.0, restart=False)[:3] == ((8, 8), False, 1)
+    for step in range(1, 8):
+        assert sample(0.01 * step, restart=True)[:3] == ((4, 4), True, 1)
+    size, in_haste, samples, known = sample(0.07, restart=False)
+    assert (size, in_haste, samples) == ((8, 8), False, 1)
+    assert 2.0 < known <= 1.0 + COARSE_HISTORY
+    assert sample(0.07, restart=False)[:3] == ((8, 8), False, 2)
+    studio.show(picture(block_at=5.1))
+    assert sample(0.07, restart=True)[:2] == ((4, 4), True)
+    assert sample(0.1, restart=True, vpl_coarser_in_motion=False)[:2] == ((8, 8), False)
+    assert sample(0.2, restart=True, vpl_coarser_in_motion=False)[:2] == ((8, 8), False)
+    assert sample(0.3, restart=True, vpl_scale="EIGHTH")[0] == (1, 1)
     studio.renderer.free_frame(frame)
 
 
