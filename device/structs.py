@@ -21,8 +21,8 @@ import numpy as np
 from .names import is_name
 
 TEXEL_BYTES = 16
-# Every GPU we support takes so many rows. A power of two: the shader divides by it.
-MAX_TABLE_ROWS = 16384
+# Every Vulkan device takes so many rows, and every OpenGL of Blender's more. A power of two: the shader divides by it.
+MAX_TABLE_ROWS = 4096
 MAX_EXACT_INT = 2**24
 
 # type: (floats, alignment in floats)
