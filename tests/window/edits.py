@@ -8,8 +8,10 @@ import numpy as np
 from steps import (
     OUT,
     PACKAGE,
+    SAME,
     check,
     count_draws,
+    cube_on_floor,
     difference,
     finished,
     module,
@@ -25,18 +27,9 @@ from steps import (
     window_context,
 )
 
-SAME = 0.004  # mean difference of two pictures of the same: noise of a few samples
-
 
 def scenario():
-    scene = bpy.context.scene
-    scene.render.engine = "REBOUND"
-    scene.rebound.viewport_samples = 8
-    bpy.data.objects["Light"].data.energy = 2000
-    bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1))
-    space = window_context()["space_data"]
-    space.overlay.show_overlays = False
-    space.shading.type = "RENDERED"
+    cube_on_floor(samples=8)
     yield from finished(90)
     first = picture("first")
     yield from other_engine(first)

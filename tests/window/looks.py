@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from steps import (
+    SAME,
     check,
     count_draws,
     difference,
@@ -14,6 +15,7 @@ from steps import (
     middle,
     picture,
     point,
+    principled,
     run,
     samples,
     screenshot,
@@ -22,18 +24,14 @@ from steps import (
     window_context,
 )
 
-SAME = 0.004  # mean difference of two pictures of the same: noise of a few samples
-
 
 def red_room() -> None:
     """A grey cube between red walls: what bounces is red."""
     scene = bpy.context.scene
     scene.render.engine = "REBOUND"
     scene.rebound.viewport_samples = 8
-    red = bpy.data.materials.new("Red")
-    if bpy.app.version < (5, 0):
-        red.use_nodes = True
-    red.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.02, 0.02, 1)
+    red, surface = principled("Red")
+    surface.inputs["Base Color"].default_value = (0.8, 0.02, 0.02, 1)
     for location, rotation in (((0, 0, -1), (0, 0, 0)), ((-3, 0, 2), (0, 1.5708, 0)), ((0, 3, 2), (1.5708, 0, 0))):
         bpy.ops.mesh.primitive_plane_add(size=6, location=location, rotation=rotation)
         bpy.context.object.data.materials.append(red)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 from steps import (
+    SAME,
     check,
     count_draws,
+    cube_on_floor,
     difference,
     drag,
     finished,
@@ -21,18 +23,10 @@ from steps import (
     window_context,
 )
 
-SAME = 0.004  # mean difference of two pictures of the same: noise of a few samples
-
 
 def scenario():
-    scene = bpy.context.scene
-    scene.render.engine = "REBOUND"
-    scene.rebound.viewport_samples = 4
-    bpy.data.objects["Light"].data.energy = 2000
-    bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1))
-    space = window_context()["space_data"]
-    space.overlay.show_overlays = space.show_gizmo = False
-    space.shading.type = "RENDERED"
+    space = cube_on_floor(samples=4)
+    space.show_gizmo = False
     space.region_3d.view_location, space.region_3d.view_distance = (0, 0, 0), 12
     yield from finished(90)
     yield from play(count_draws())

@@ -24,6 +24,7 @@ OUT = os.environ["WINDOW_OUT"]
 SCREEN = (1280, 800)
 FAILURES: list[str] = []
 STARTED = time.monotonic()
+SAME = 0.004  # mean difference of two pictures of the same: noise of a few samples
 
 Place = tuple[int, int]
 Steps = Iterator[float]
@@ -66,6 +67,27 @@ def select(name: str) -> None:
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name == name)
     bpy.context.view_layer.objects.active = bpy.data.objects[name]
+
+
+def cube_on_floor(samples: int) -> Any:
+    """Blender's own scene, brighter and with a floor, in the first 3D viewport without overlays; its space."""
+    scene = bpy.context.scene
+    scene.render.engine = "REBOUND"
+    scene.rebound.viewport_samples = samples
+    bpy.data.objects["Light"].data.energy = 2000
+    bpy.ops.mesh.primitive_plane_add(size=12, location=(0, 0, -1))
+    space = window_context()["space_data"]
+    space.overlay.show_overlays = False
+    space.shading.type = "RENDERED"
+    return space
+
+
+def principled(name: str) -> tuple[Any, Any]:
+    """A new material and its Principled BSDF."""
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    return material, material.node_tree.nodes["Principled BSDF"]
 
 
 def sessions() -> list:

@@ -11,6 +11,7 @@ from steps import (
     finished,
     module,
     picture,
+    principled,
     run,
     samples,
     say,
@@ -30,10 +31,8 @@ def build(scene) -> None:
     bpy.data.objects["Light"].rotation_euler = (0.65, 0.05, 1.85)
     # So wide that grids of voxels lie around one another: lavapipe is easily crashed by them.
     bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
-    floor = bpy.data.materials.new("Floor")
-    if bpy.app.version < (5, 0):
-        floor.use_nodes = True
-    floor.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.1, 0.1, 1)
+    floor, surface = principled("Floor")
+    surface.inputs["Base Color"].default_value = (0.8, 0.1, 0.1, 1)
     bpy.context.object.data.materials.append(floor)
 
 

@@ -15,6 +15,7 @@ from steps import (
     middle,
     picture,
     point,
+    principled,
     run,
     screenshot,
     viewports,
@@ -35,10 +36,7 @@ def build() -> None:
     background = scene.world.node_tree.nodes["Background"]
     background.inputs["Color"].default_value = (0, 0, 0, 1)
     bpy.ops.mesh.primitive_monkey_add(size=2, location=(2.5, 0.5, 0))
-    material = bpy.data.materials.new("Shine")
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    surface = material.node_tree.nodes["Principled BSDF"]
+    material, surface = principled("Shine")
     surface.inputs["Emission Color"].default_value = (1, 1, 1, 1)
     surface.inputs["Emission Strength"].default_value = 1
     surface.inputs["Base Color"].default_value = (0, 0, 0, 1)
