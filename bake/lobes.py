@@ -1,4 +1,4 @@
-"""Lobes around an axis (zonal harmonics): cosine, Phong; convolution with them; windows against ringing.
+"""Lobes around an axis (zonal harmonics): cosine, Phong; turned anywhere; a window against ringing.
 
 A lobe is its n coefficients z_l of the functions with m = 0, its axis being +Z. Convolving a function with it
 multiplies band l by sqrt(4 pi / (2 l + 1)) z_l (Funk and Hecke).
@@ -15,12 +15,6 @@ from .sphere import Array
 def band_scales(bands: int) -> Array:
     """(bands,) sqrt(4 pi / (2 l + 1))."""
     return np.sqrt(4.0 * np.pi / (2.0 * np.arange(bands) + 1.0))
-
-
-def convolve(coefficients: Array, lobe: Array) -> Array:
-    """The function seen through ``lobe`` around every direction."""
-    bands = band_count(coefficients)
-    return coefficients * (band_scales(bands) * lobe[:bands])[band_of(bands)]
 
 
 def turn(lobe: Array, axes: Array) -> Array:
@@ -51,18 +45,6 @@ def cosine(bands: int) -> Array:
 def window(coefficients: Array, factors: Array) -> Array:
     """Multiply each band by its factor."""
     return coefficients * factors[band_of(band_count(coefficients))]
-
-
-def hanning(bands: int, width: float) -> Array:
-    """A raised cosine: 1 in band 0, 0 from band ``width`` on."""
-    orders = np.arange(bands)
-    return np.where(orders < width, 0.5 * (1.0 + np.cos(np.pi * orders / width)), 0.0)
-
-
-def lanczos(bands: int, width: float) -> Array:
-    """sinc: 1 in band 0, 0 from band ``width`` on. Keeps more of the middle bands, and rings more, than ``hanning``."""
-    orders = np.arange(bands)
-    return np.where(orders < width, np.sinc(orders / width), 0.0)
 
 
 def laplacian(bands: int, strength: float) -> Array:

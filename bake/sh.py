@@ -9,14 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .sphere import (
-    Array,
-    cube_directions,
-    cube_solid_angles,
-    equirect_directions,
-    equirect_solid_angles,
-    quadrature,
-)
+from .sphere import Array, quadrature
 
 MAX_BANDS = 11
 # Directions evaluated at a time: 16,384 with 121 coefficients are 16 MB.
@@ -81,28 +74,6 @@ def project(values: Array, directions: Array, weights: Array, bands: int) -> Arr
         basis = evaluate(directions[chunk], bands) * weights[chunk, None]
         total += np.tensordot(values[chunk], basis, axes=(0, 0))
     return total
-
-
-def project_function(function, bands: int, degree: int = 128) -> Array:
-    """Coefficients of ``function``, directions (n, 3) -> values (n, ...): exact for polynomials up to
-    ``degree`` less the highest order, and as good as that many samples are for anything else.
-    """
-    directions, weights = quadrature(degree)
-    return project(function(directions), directions, weights, bands)
-
-
-def project_cube(faces: Array, bands: int) -> Array:
-    """(channels, bands²) coefficients of a cube map (6, size, size, channels), faces as in ``sphere.FACES``."""
-    size = faces.shape[1]
-    directions, weights = cube_directions(size).reshape(-1, 3), cube_solid_angles(size).reshape(-1)
-    return project(faces.reshape(len(directions), -1), directions, weights, bands)
-
-
-def project_equirect(image: Array, bands: int) -> Array:
-    """(channels, bands²) coefficients of an environment image (height, width, channels), row 0 at the bottom."""
-    height, width = image.shape[:2]
-    directions, weights = equirect_directions(height, width), equirect_solid_angles(height, width)
-    return project(image.reshape(height * width, -1), directions.reshape(-1, 3), weights.reshape(-1), bands)
 
 
 def rotation_blocks(rotation: Array, bands: int) -> list[Array]:

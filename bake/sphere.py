@@ -65,23 +65,6 @@ def cube_solid_angles(size: int) -> Array:
     return np.broadcast_to(face, (6, size, size))
 
 
-def equirect_directions(height: int, width: int) -> Array:
-    """(height, width, 3): where each pixel of an environment image looks, row 0 at the bottom, as Blender maps it.
-
-    The middle column looks down +X, and columns run clockwise seen from above: the left quarter is +Y.
-    """
-    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * (2.0 * np.pi)
-    elevation = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
-    x, y = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
-    return np.stack([x, y, np.broadcast_to(np.sin(elevation), x.shape)], axis=-1)
-
-
-def equirect_solid_angles(height: int, width: int) -> Array:
-    """(height, width) steradians of each pixel, exact."""
-    edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
-    return np.broadcast_to(np.diff(edges)[:, None] * (2.0 * np.pi / width), (height, width))
-
-
 def texel_of(directions: Array, size: int) -> Array:
     """(n,) the texel of a cube map that each of ``directions`` (n, 3) passes, numbered over faces, t, s."""
     major = np.abs(directions).argmax(axis=1)
