@@ -6,8 +6,6 @@
 const int VOXEL_MOST_STEPS = 8192;
 /* Voxels: the start of a ray is so much further from its surface than the surface's own voxels reach. */
 const float VOXEL_ROUNDING = 0.02;
-/* Voxels: nothing can be told of what lies between points this near. */
-const float VOXEL_NEAREST = 2.0;
 /* Out of another surface's voxels towards who sees the point: so many steps of so many voxels. */
 const int VOXEL_ESCAPES = 4;
 const float VOXEL_ESCAPE = 0.75;
@@ -91,12 +89,6 @@ float voxel_trace_grid(VoxelPlace place, vec3 origin, vec3 slope, vec3 inverse, 
   }
   way = first > 0.0 ? way : met >= 0.0 ? met : last * place.edge;
   return met;
-}
-
-/* Whether P lies in the grid around the scene, where voxels are finest. */
-bool voxel_inside(vec3 P)
-{
-  return voxel_place_holds(voxel_place(0), P);
 }
 
 /* Where a ray along a unit direction first enters an occupied voxel: metres, 0 if it starts in one, negative if it
@@ -199,12 +191,4 @@ vec3 voxel_start_seen(vec3 P, vec3 geometric_normal, vec3 seen_from)
     steps++;
   } while (occupied && steps <= VOXEL_ESCAPES);
   return occupied ? start : moved;
-}
-
-/* Whether nothing lies between two surface points whose unit normals point to the side that is asked about. Points
- * nearer than the grid can tell see each other. */
-bool voxel_visible(vec3 P, vec3 P_geometric, vec3 Q, vec3 Q_geometric)
-{
-  return distance(P, Q) < VOXEL_NEAREST * voxel_edge_at(P) ||
-         voxel_clear(voxel_start(P, P_geometric), voxel_start(Q, Q_geometric));
 }

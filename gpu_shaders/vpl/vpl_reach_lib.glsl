@@ -1,19 +1,17 @@
 /* Whether light reaches a surface: a ray through the voxels, and for contacts that they are too coarse for a short one over
  * the screen. Needs position_tx, the G-buffer's, and vpl_frame beside what voxel_lib.glsl needs. */
 #include "frame/voxel_lib.glsl"
+#include "lib/math_lib.glsl"
 #include "vpl/vpl_lib.glsl"
 
+/* Voxels: nothing can be told of what lies between points this near. */
+const float REACH_NEAREST = 2.0;
 /* The ray over the screen: its length and the thickness of what blocks it, both in voxels; its steps. */
 const float REACH_CONTACT = 4.0;
 const float REACH_THICKNESS = 2.0;
 const int REACH_STEPS = 6;
 /* Voxels by which a surface must lie before the ray: less is the rounding of a picture's pixels. */
 const float REACH_BEFORE = 0.25;
-
-float reach_depth(vec3 P)
-{
-  return vpl_frame.eye.w > 0.5 ? distance(P, vpl_frame.eye.xyz) : -dot(P, vpl_frame.eye.xyz);
-}
 
 vec2 reach_place(vec4 clip)
 {
@@ -43,7 +41,7 @@ bool reach_contact(vec3 P, vec3 Q)
     vec2 place = reach_place(mix(first, last, part));
     inside = all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, vec2(1.0)));
     vec4 seen = texelFetch(position_tx, clamp(ivec2(place * size), ivec2(0), ivec2(size) - 1), 0);
-    float before = reach_depth(p) - reach_depth(seen.xyz);
+    float before = math_depth(p, vpl_frame.eye) - math_depth(seen.xyz, vpl_frame.eye);
     free = !inside || seen.w == 0.0 || before <= REACH_BEFORE * voxel_grid.edge ||
            before >= REACH_THICKNESS * voxel_grid.edge;
     i++;
@@ -54,7 +52,7 @@ bool reach_contact(vec3 P, vec3 Q)
 /* Whether a surface at P, whose rays begin at `start` (voxel_start_seen), sees the light. */
 bool reach_sees(vec3 P, vec3 start, Vpl vpl)
 {
-  if (vpl_frame.occluded == 0 || distance(P, vpl.position) < VOXEL_NEAREST * voxel_grid.edge) {
+  if (vpl_frame.occluded == 0 || distance(P, vpl.position) < REACH_NEAREST * voxel_grid.edge) {
     return true;
   }
   return voxel_clear(start, voxel_start(vpl.position, vpl.normal)) &&

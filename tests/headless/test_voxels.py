@@ -256,7 +256,7 @@ def test_points_see_each_other_unless_a_wall_is_between(room):
     low, high = quad("low", (0, 0, 0)), quad("high", (0, 0, 1))
     P = np.concatenate([rng.uniform(-0.9, 0.9, (3000, 2)), np.zeros((3000, 1))], 1)
     Q = np.concatenate([rng.uniform(-0.9, 0.9, (3000, 2)), np.ones((3000, 1))], 1)
-    seen = "voxel_visible(P, vec3(0.0, 0.0, 1.0), Q, vec3(0.0, 0.0, -1.0))"
+    seen = "voxel_clear(voxel_start(P, vec3(0.0, 0.0, 1.0)), voxel_start(Q, vec3(0.0, 0.0, -1.0)))"
     assert (room(scene([low, high])).ask(seen, P=P, Q=Q) == 1).all()
     walled = room(scene([low, high, quad("wall", (0.0123, 0, 0.5), (0, 1, 0), (0, 0, 0.5))]))
     edge = walled.voxels.edge

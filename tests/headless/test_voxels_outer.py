@@ -94,13 +94,12 @@ def test_outer_grids_hold_nothing_of_what_the_inner_one_holds(room):
         assert len(np.unique(voxels[:, 2])) == 1  # the ground alone
 
 
-def test_edge_and_inside_tell_the_grid_of_a_point(room):
+def test_edge_tells_the_grid_of_a_point(room):
     shown = room(scene([CUBE, ground(300)]))
     grids = shown.voxels.grids
     points = np.array([grid.bounds[1] - 0.4 * grid.edge for grid in grids] + [(9e3, 0, 0)])
     expected = [grid.edge for grid in grids] + [grids[-1].edge]
     np.testing.assert_allclose(shown.ask("voxel_edge_at(P)", P=points), expected, rtol=1e-6)
-    np.testing.assert_array_equal(shown.ask("float(voxel_inside(P))", P=points), [1] + [0] * len(grids))
 
 
 # --- rays ------------------------------------------------------------------------------------------------------------
@@ -200,7 +199,7 @@ def test_ground_outside_does_not_stop_its_own_rays(room, half):
 
 def test_points_of_the_ground_see_the_cube_and_not_through_it(room):
     shown = room(scene([CUBE, ground(40)]), resolution=128)
-    clear = "float(voxel_visible(P, vec3(0.0, 0.0, 1.0), Q, n))"
+    clear = "float(voxel_clear(voxel_start(P, vec3(0.0, 0.0, 1.0)), voxel_start(Q, n)))"
     P = np.array([(-3.0, 0.1, 0), (-20.0, 3.0, 0), (3.0, 0.1, 0), (20.0, 3.0, 0), (3.0, 0.1, 0)])
     Q = np.array([(-0.5, 0.1, 0.5)] * 4 + [(-4.0, 0.0, 0)])
     n = np.array([(-1.0, 0, 0)] * 4 + [(0.0, 0, 1)])
