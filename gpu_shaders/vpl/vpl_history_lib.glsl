@@ -6,12 +6,16 @@
 const float HISTORY_LEAST = 0.02;
 /* Means of fewer samples than this do not know their variance. */
 const float HISTORY_FEW = 4.0;
+/* A place of what was in no picture before. */
+const vec2 HISTORY_NOWHERE = vec2(-8.0);
 
 struct HistoryTaps {
   ivec2 lower;
   vec4 shares; /* of the texels at lower + (0 0, 1 0, 0 1, 1 1); all zero: there is no history */
 };
 
+/* A `place` outside the picture has none. Lavapipe crashes where a texture is first read in a loop that only some pixels
+ * go through: all call these, and all read. */
 HistoryTaps history_taps(sampler2D old_surface_tx, vec2 place, Gatherer at)
 {
   HistoryTaps taps = HistoryTaps(ivec2(floor(place)), vec4(0.0));
@@ -20,12 +24,10 @@ HistoryTaps history_taps(sampler2D old_surface_tx, vec2 place, Gatherer at)
   for (int i = 0; i < 4; i++) {
     ivec2 corner = ivec2(i & 1, i >> 1);
     ivec2 texel = taps.lower + corner;
-    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) {
-      continue;
-    }
-    Gatherer old = surface_unpack(texelFetch(old_surface_tx, texel, 0));
+    ivec2 inside = clamp(texel, ivec2(0), size - 1);
+    Gatherer old = surface_unpack(texelFetch(old_surface_tx, inside, 0));
     vec2 near = mix(1.0 - part, part, vec2(corner)) + 1e-3;
-    float weight = old.exists ? near.x * near.y * surface_alike(at, old) : 0.0;
+    float weight = inside == texel && old.exists ? near.x * near.y * surface_alike(at, old) : 0.0;
     taps.shares[i] = weight > 1e-3 ? weight : 0.0;
   }
   float sum = dot(taps.shares, vec4(1.0));
@@ -36,10 +38,10 @@ HistoryTaps history_taps(sampler2D old_surface_tx, vec2 place, Gatherer at)
 vec4 history_mean(HistoryTaps taps, sampler2D history_tx)
 {
   vec4 sum = vec4(0.0);
+  ivec2 last = textureSize(history_tx, 0) - 1;
   for (int i = 0; i < 4; i++) {
-    if (taps.shares[i] > 0.0) {
-      sum += taps.shares[i] * texelFetch(history_tx, taps.lower + ivec2(i & 1, i >> 1), 0);
-    }
+    vec4 texel = texelFetch(history_tx, clamp(taps.lower + ivec2(i & 1, i >> 1), ivec2(0), last), 0);
+    sum += taps.shares[i] > 0.0 ? taps.shares[i] * texel : vec4(0.0);
   }
   return sum;
 }

@@ -26,15 +26,13 @@ void main()
 
   vec4 clip = old_view.clip_from_world * vec4(at.P, 1.0);
   vec2 pixel = (0.5 + 0.5 * clip.xy / clip.w) * old_view.size - 0.5;
-  vec4 history = vec4(0.0), direct_history = vec4(0.0);
-  if (clip.w > 0.0 && pc_most_history > 0.0) {
-    vec2 place = (pixel - old_view.offset) / old_view.stride;
-    /* Between texels it would be blurred once more in every sample of a still view, without end. */
-    place = pc_still != 0 ? floor(place + 0.5) : place;
-    HistoryTaps taps = history_taps(old_surface_tx, place, at);
-    history = history_mean(taps, history_tx);
-    direct_history = history_mean(taps, direct_history_tx);
-  }
+  vec2 place = (pixel - old_view.offset) / old_view.stride;
+  /* Between texels it would be blurred once more in every sample of a still view, without end. */
+  place = pc_still != 0 ? floor(place + 0.5) : place;
+  place = clip.w > 0.0 && pc_most_history > 0.0 ? place : HISTORY_NOWHERE;
+  HistoryTaps taps = history_taps(old_surface_tx, place, at);
+  vec4 history = history_mean(taps, history_tx);
+  vec4 direct_history = history_mean(taps, direct_history_tx);
   float most = pc_still != 0 ? pc_most_history : pc_most_history * smoothstep(0.0, REFLECT_STEADY, roughness);
   HistoryJoined joined = history_joined(history, direct_history.w, light, most);
   float variance = joined.variance;
