@@ -87,11 +87,13 @@ Receiver shadow_receiver(MapFace face, vec3 P, vec3 geometric)
   return receiver;
 }
 
-/* Visibility by `taps` texels within `width`, from noise. Where none of them tells anything (a wall's top edge would be lit
- * from beyond the ceiling that rests on it), the nine around the receiver's own answer for them; lit if they do not. */
-float shadow_mean(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, int taps, vec2 width,
+/* Visibility by SHADOW_TAPS texels within `width` where it is `wide`, or by one within a texel's; which, noise tells.
+ * Where none of them tells anything (a wall's top edge would be lit from beyond the ceiling that rests on it), the nine
+ * around the receiver's own answer for them; lit if they do not. */
+float shadow_mean(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver receiver, bool wide, vec2 width,
                   vec2 noise)
 {
+  int taps = wide ? SHADOW_TAPS : 1;
   float lit = 0.0;
   float telling = 0.0;
   int end = taps;
@@ -99,7 +101,7 @@ float shadow_mean(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver
   do {
     int around = i - taps;
     vec2 aside = around >= 0 ? vec2(around % 3 - 1, around / 3 - 1) / face.tile
-                 : taps == 1 ? (noise - 0.5) / face.tile
+                 : !wide     ? (noise - 0.5) / face.tile
                              : width * sampling_vogel_disc(i, SHADOW_TAPS, noise.y);
     int state = shadow_tap(face, depth_tx, slope_tx, receiver, receiver.uv + aside).state;
     telling += state == SHADOW_MISSED ? 0.0 : 1.0;
@@ -114,7 +116,7 @@ float shadow_mean(MapFace face, sampler2D depth_tx, sampler2D slope_tx, Receiver
 float shadow_hard(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, vec3 geometric, vec2 noise)
 {
   Receiver receiver = shadow_receiver(face, P, geometric);
-  return shadow_mean(face, depth_tx, slope_tx, receiver, 1, vec2(0.0), noise);
+  return shadow_mean(face, depth_tx, slope_tx, receiver, false, vec2(0.0), noise);
 }
 
 /* Percentage-closer soft shadows (Fernando 2005): find blockers, take the penumbra's width from their mean depth, filter
@@ -139,5 +141,5 @@ float shadow_soft(MapFace face, sampler2D depth_tx, sampler2D slope_tx, vec3 P, 
   float apart = blocker / max(blockers, 1.0) - receiver.closeness;
   vec2 width = per_metre * (face.perspective != 0 ? apart / face.far : apart * face.far);
   width = clamp(width, vec2(0.5 / face.tile), vec2(SHADOW_WIDEST_SEARCH));
-  return shadow_mean(face, depth_tx, slope_tx, receiver, blockers > 0.0 ? SHADOW_TAPS : 1, width, noise);
+  return shadow_mean(face, depth_tx, slope_tx, receiver, blockers > 0.0, width, noise);
 }

@@ -1,5 +1,6 @@
-/* Shadows of what lets light pass, on the whole or through the backs of faces: of each texel's light as much is stopped, all or nothing, as of the whole. The
- * material is asked from the side of what the shadow falls on, whence Cycles' rays come. */
+/* Shadows of what lets light pass, on the whole or through the backs of faces: of each texel's light as much is stopped,
+ * all or nothing, as of the whole. The material is asked from the side of what the shadow falls on, whence Cycles' rays
+ * come. */
 #include "frame/material_dither_lib.glsl"
 #include "frame/material_mesh_lib.glsl"
 #include "frame/shadow_slope_lib.glsl"
