@@ -34,16 +34,15 @@ def draw_scene(
     shader: Shader,
     target: Target,
     draws: Sequence[Draw],
-    viewport: Viewport | None = None,
-    state: DrawState = OPAQUE,
     lets_pass: Passes | None = None,
-    **shared: Any,
+    **given: Any,
 ) -> None:
-    """Draw, with depth test unless ``state`` says otherwise. ``lets_pass``: what light goes through, by the material's
-    index; all that is transparent if it is not given.
+    """Draw. ``lets_pass``: what light goes through, by the material's index; all that is transparent if not given.
+
+    What else is ``given`` is told by ``draw_batches``.
     """
     batches = gpu_scene.batches.of(gpu_scene, shader, draws, lets_pass or gpu_scene.lets_pass)
-    draw_batches(device, gpu_scene, target, batches, viewport, state, **shared)
+    draw_batches(device, gpu_scene, target, batches, **given)
 
 
 def draw_batches(
@@ -55,7 +54,10 @@ def draw_batches(
     state: DrawState = OPAQUE,
     **shared: Any,
 ) -> None:
-    """The same of draws that were put together."""
+    """Draw what was put together, with depth test unless ``state`` says otherwise.
+
+    ``shared``: what the shader wants beside instances, materials and what the batches themselves give.
+    """
     shared["instance_tx"] = gpu_scene.instance_table
     for program, members in groupby(batches, lambda batch: batch.program):
         common = shared

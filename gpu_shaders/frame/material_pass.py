@@ -119,5 +119,5 @@ def _corner(code: MaterialShader) -> str:
         f"  v_{name} = texelFetch({attribute_sampler(name)}, texel, 0).{SWIZZLES[a.field]};\n"
         for name, a in code.mesh_fields.items()
     )
-    at = "  ivec2 texel = ivec2(on_page % MESH_PAGE_WIDTH, on_page / MESH_PAGE_WIDTH);\n" if lines else ""
-    return f"void material_corner(int on_page)\n{{\n{at}{lines}}}\n"
+    at = "  ivec2 texel = mesh_texel(on_page);\n" if lines else ""
+    return f'#include "frame/mesh_lib.glsl"\n\nvoid material_corner(int on_page)\n{{\n{at}{lines}}}\n'

@@ -124,15 +124,14 @@ class ReflectiveShadowMaps(LightMaps):
     def _draw(self, gpu_scene: GpuScene, tile: MapTile) -> None:
         target, viewport = self.begin(tile, gpu_scene)
         draws = visible_draws(gpu_scene, Visibility.SHADOW | Visibility.BOUNCE, tile.face.sees)
-
         draw_scene(
             self.device,
             gpu_scene,
             REFLECT,
             target,
             draws,
-            viewport,
             lets_pass=gpu_scene.lets_lamps_pass,
+            viewport=viewport,
             reflected_light=self._light_blocks[tile.lamp],
             pc_clip_from_world=tile.face.clip_from_world,
             pc_perspective=int(tile.face.perspective),
