@@ -82,8 +82,7 @@ BAKE_SETTINGS = (
         "FLOAT",
         "Error",
         "Glossy: how far compressed matrices, of sharp ones the bounces, may be off, as a part of their mean length. "
-        "Higher takes less memory, "
-        "lower is truer at the cost of memory",
+        "Higher takes less memory, lower is truer at the cost of memory",
         0.01,
         minimum=0.0,
         maximum=1.0,
