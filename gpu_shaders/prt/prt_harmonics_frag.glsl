@@ -1,9 +1,8 @@
 /* The radiance that arrives, as spherical harmonics between the vertices (Sloan, Kautz, Snyder 2002): convolved with the
  * cosine around the normal, and as a table over roughness and view says that the material is seen (Kautz, Sloan,
  * Snyder 2002). */
-#include "lib/bxdf_lib.glsl"
-#include "lib/octahedron_lib.glsl"
 #include "lib/sh_lib.glsl"
+#include "prt/prt_surface_lib.glsl"
 
 /* The cosine lobe over pi, a factor a band (Ramamoorthi & Hanrahan 2001). */
 const float PRT_COSINE[6] = float[6](1.0, 0.66666667, 0.25, 0.0, -0.041666667, 0.0);
@@ -28,21 +27,20 @@ void prt_weights(float roughness, float cosine, out vec4 weights[PRT_TEXELS])
 }
 
 /* What the harmonics of the arriving radiance are multiplied with to be what is seen, along the bake's axes. */
-void prt_seen(vec3 N, vec3 V, float roughness, mat3 local, out float seen[SH_MOST])
+void prt_seen(PrtSurface surface, mat3 local, out float seen[SH_MOST])
 {
-  float cosine = clamp(dot(N, V), 0.0, 1.0);
-  vec3 across = cosine * N - V; /* away from the view, along the surface */
+  vec3 across = surface.cosine * surface.N - surface.V; /* away from the view, along the surface */
   float size = length(across);
   across = size > 1e-6 ? across / size : vec3(0.0);
   vec4 weights[PRT_TEXELS];
-  prt_weights(roughness, cosine, weights);
+  prt_weights(surface.specular.a, surface.cosine, weights);
   for (int i = 0; i < SH_MOST; i++) {
     seen[i] = 0.0;
   }
   float at[SH_MOST];
   for (int k = 0; k < PRT_BANDS; k++) {
     float angle = (float(k) + 0.5) * (MATH_PI / float(PRT_BANDS));
-    sh_evaluate(local * (sin(angle) * across + cos(angle) * N), at);
+    sh_evaluate(local * (sin(angle) * across + cos(angle) * surface.N), at);
     int i = 1;
     for (int order = 1; order * order < prt_draw.coefficients; order++) {
       int number = k * (PRT_BANDS - 1) + order - 1;
@@ -68,20 +66,13 @@ vec4 prt_mixed(int texel)
 
 void main()
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  out_position = vec4(v_position, 1.0 + float(prt_draw.has));
-  vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
-  vec3 V = math_toward(v_position, prt_draw.eye);
-  vec4 specular = texelFetch(specular_tx, pixel, 0);
-  float cosine = clamp(dot(N, V), 0.0, 1.0);
-
+  PrtSurface surface = prt_surface();
   mat3 local = mat3(prt_draw.local_from_world);
   float at_normal[SH_MOST];
   float seen[SH_MOST];
-  sh_evaluate(local * N, at_normal);
-  bool reflects = specular.rgb != vec3(0.0);
-  if (reflects) {
-    prt_seen(N, V, specular.a, local, seen);
+  sh_evaluate(local * surface.N, at_normal);
+  if (surface.reflects) {
+    prt_seen(surface, local, seen);
   }
 
   /* Three numbers a coefficient, one after another in texels of four. */
@@ -102,9 +93,7 @@ void main()
     }
     order += i == (order + 1) * (order + 1) ? 1 : 0;
     irradiance += value * (at_normal[i] * PRT_COSINE[order]);
-    radiance += reflects ? value * seen[i] : vec3(0.0);
+    radiance += surface.reflects ? value * seen[i] : vec3(0.0);
   }
-  out_diffuse = vec4(max(irradiance, vec3(0.0)), 1.0);
-  vec3 part = reflects ? bxdf_albedo(specular.rgb, specular.a, cosine) : vec3(0.0);
-  out_glossy = vec4(part * max(radiance, vec3(0.0)), 1.0);
+  prt_write(surface, irradiance, radiance);
 }

@@ -1,8 +1,7 @@
 /* What a vertex reflects as a sum of products (Wang, Tran, Luebke 2004): the numbers that its light gave, each times a
  * function of the view along the vertex' own normal and tangent. Each corner is seen for itself, then they are mixed:
  * twin of Separable.of_view() in bake/separable.py. */
-#include "lib/bxdf_lib.glsl"
-#include "lib/octahedron_lib.glsl"
+#include "prt/prt_surface_lib.glsl"
 
 vec4 prt_number(int vertex, int i)
 {
@@ -38,20 +37,13 @@ vec3 prt_mirrored(int vertex, vec3 V)
 
 void main()
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  out_position = vec4(v_position, 1.0 + float(prt_draw.has));
-  vec3 N = octahedron_decode(texelFetch(normal_tx, pixel, 0).xy);
-  vec3 V = math_toward(v_position, prt_draw.eye);
-  vec4 specular = texelFetch(specular_tx, pixel, 0);
-  bool reflects = specular.rgb != vec3(0.0);
-  vec3 local = mat3(prt_draw.local_from_world) * V;
+  PrtSurface surface = prt_surface();
+  vec3 local = mat3(prt_draw.local_from_world) * surface.V;
   vec3 irradiance = vec3(0.0);
   vec3 radiance = vec3(0.0);
   for (int corner = 0; corner < 3; corner++) {
     irradiance += v_weights[corner] * prt_number(v_triangle[corner], 0).rgb;
-    radiance += reflects ? v_weights[corner] * prt_mirrored(v_triangle[corner], local) : vec3(0.0);
+    radiance += surface.reflects ? v_weights[corner] * prt_mirrored(v_triangle[corner], local) : vec3(0.0);
   }
-  out_diffuse = vec4(max(irradiance, vec3(0.0)), 1.0);
-  vec3 part = reflects ? bxdf_albedo(specular.rgb, specular.a, clamp(dot(N, V), 0.0, 1.0)) : vec3(0.0);
-  out_glossy = vec4(part * max(radiance, vec3(0.0)), 1.0);
+  prt_write(surface, irradiance, radiance);
 }
