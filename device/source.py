@@ -84,12 +84,12 @@ def assemble(shader_name: str, stage: str, path: str, files: Mapping[str, str]) 
             return
         done.add(file)
         code = strip_comments(_read(shader_name, stage, file, files, asked_at))
-        for number, line in enumerate(code.splitlines(), 1):
-            match = _INCLUDE.match(line)
-            if match:
-                visit(match[1], (*trail, file), f"{file}:{number}")
+        for number, line, included in _parsed(code):
+            if included:
+                visit(included, (*trail, file), f"{file}:{number}")
             else:
-                source.add(line or " ", file, number)
+                source.lines.append(line)
+                source.origins.append((file, number))
         faults = [f"{file}:{number}: {what}" for number, what in check(code)]
         if faults:
             raise ShaderError(shader_name, stage, "\n".join(faults))
@@ -112,6 +112,16 @@ def _read(shader_name: str, stage: str, file: str, files: Mapping[str, str], ask
 def strip_comments(text: str) -> str:
     """Replace comments by blanks, keeping the lines. (GLSL has no strings that could hold a comment sign.)"""
     return _COMMENT.sub(lambda m: "\n" * m[0].count("\n") or " ", text)
+
+
+@lru_cache(maxsize=512)
+def _parsed(code: str) -> list[tuple[int, str, str]]:
+    """Number, text and included file, "" if none, of every line of text without comments."""
+    found = []
+    for number, line in enumerate(code.splitlines(), 1):
+        match = _INCLUDE.match(line)
+        found.append((number, line or " ", match[1] if match else ""))
+    return found
 
 
 @lru_cache(maxsize=512)
