@@ -33,6 +33,7 @@ float direct_visibility(Light light, vec3 P, vec3 geometric, vec2 noise)
   int index;
   MapFace face = light_map_face(light, face_tx, P, index);
 #endif
+  face.perspective = light.kind == LIGHT_SUN ? 0 : 1; /* known to the compiler, as the kind is */
   /* A sized spot reaches a little beyond the cone of the point that its map was drawn from: the map's edge answers. */
   bool spot = light.kind == LIGHT_SPOT && light.emitter_radius > 0.0 && light.face_count == 1;
   vec3 p = map_position(face, P);
