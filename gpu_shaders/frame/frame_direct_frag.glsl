@@ -86,8 +86,9 @@ void main()
 #endif
   vec2 noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed));
   vec3 own_source = light.filtered != 0 ? direct_own_source(light, position.xyz, noise) : light.source;
-  /* The irradiance from a whole point light or sun has a closed form. */
-  bool whole = light.filtered != 0 && light.kind != LIGHT_AREA;
+  /* The irradiance from a whole point light, sun or rectangle has a closed form. */
+  bool rectangle = light_whole_rectangle(light, position.xyz);
+  bool whole = rectangle || light.filtered != 0 && light.kind != LIGHT_AREA;
   vec3 source = whole && light.kind != LIGHT_SPOT ? light.source : own_source;
   vec3 direction = light.kind == LIGHT_SUN ? source : (whole ? light.position : source) - position.xyz;
   vec3 diffuse = light_unshadowed(light, position.xyz, N, source);
@@ -100,7 +101,7 @@ void main()
   }
 #endif
   /* The upper part of a light whose centre is below the horizon still shines. */
-  float below = whole ? light.emitter_radius : 0.0;
+  float below = rectangle ? length(light.half_size) : whole ? light.emitter_radius : 0.0;
   if (dot(geometric, direction) > -below && any(greaterThan(diffuse + glossy, vec3(0.0)))) {
     noise = sampling_r2(pc_sample, sampling_hash(pixel, pc_seed + 1));
     float visible = direct_visibility(light, position.xyz, geometric, noise);

@@ -2,6 +2,9 @@
  * (W/sr along its axis), the irradiance E of a sun. LIGHT_POINT ... LIGHT_AREA are defines (frame/structs.py). */
 #include "lib/math_lib.glsl"
 
+/* Rectangles seen narrower than this are a point of theirs: the sum over their edges would be rounding. */
+const float LIGHT_NARROW = 0.02;
+
 /* The cone of a spot: smoothstep between its edge and the blend's inner cone, over the cosine in the light's object
  * space. `d` is the unit direction from the light. */
 float light_spot_cone(Light light, vec3 d)
@@ -118,8 +121,55 @@ vec3 light_round_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
   return intensity * cosine / (max(dot(axis, w), 1e-2) * squared);
 }
 
+/* What the edge from a to b, relative to the receiver, adds to twice the irradiance from a polygon of radiance 1 (Baum,
+ * Rushmeier & Winget, "Improving radiosity solutions through the use of analytically determined form factors",
+ * 1989). */
+float light_edge(vec3 a, vec3 b, vec3 N)
+{
+  vec3 axis = cross(a, b);
+  float sine = length(axis);
+  return dot(axis, N) * atan(sine, dot(a, b)) / max(sine, 1e-30);
+}
+
+/* Whether light_unshadowed() gives a rectangle's whole light. */
+bool light_whole_rectangle(Light light, vec3 P)
+{
+  return light.kind == LIGHT_AREA && light.filtered != 0 && light.round_shape == 0 && light.spread_tangent < 0.0 &&
+         light_width(light, P) > LIGHT_NARROW;
+}
+
+/* Irradiance / pi from it, if its spread has no limit: from the part of it above the receiver's horizon. */
+vec3 light_rectangle_unshadowed(Light light, vec3 P, vec3 N)
+{
+  vec3 center = light.position - P;
+  vec3 x = light.half_size.x * light.axis_x;
+  vec3 y = light.half_size.y * light.axis_y;
+  vec3 a = center - x - y;
+  vec3 entered = vec3(0.0);
+  vec3 left = vec3(0.0);
+  float sum = 0.0;
+  int corner = 0;
+  do { /* the fifth edge is that along the horizon */
+    int next = corner + 1;
+    vec3 b = center + (next == 1 || next == 2 ? x : -x) + (next == 2 || next == 3 ? y : -y);
+    float above_a = dot(a, N);
+    float above_b = dot(b, N);
+    vec3 cut = a + (b - a) * clamp(above_a / (above_a == above_b ? 1.0 : above_a - above_b), 0.0, 1.0);
+    entered = above_a <= 0.0 && above_b > 0.0 ? cut : entered;
+    left = above_a > 0.0 && above_b <= 0.0 ? cut : left;
+    vec3 start = corner == 4 ? left : above_a > 0.0 ? a : cut;
+    vec3 end = corner == 4 ? entered : above_b > 0.0 ? b : cut;
+    sum += corner == 4 || above_a > 0.0 || above_b > 0.0 ? light_edge(start, end, N) : 0.0;
+    a = b;
+    corner++;
+  } while (corner < 5);
+  bool lit = dot(center, light.axis_z) > 0.0;
+  float area = 4.0 * light.half_size.x * light.half_size.y;
+  return lit ? light.intensity * max(sum, 0.0) / (2.0 * MATH_PI * area) : vec3(0.0);
+}
+
 /* Irradiance / pi at P with normal N when the light's whole power leaves from `source` (for a sun: comes from the
- * direction `source`). Where `filtered` is set, points and suns give the whole emitter's in closed form. */
+ * direction `source`). Where `filtered` is set, points, suns and rectangles give the whole emitter's in closed form. */
 vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
 {
   if (light.kind == LIGHT_SUN) {
@@ -133,6 +183,9 @@ vec3 light_unshadowed(Light light, vec3 P, vec3 N, vec3 source)
   }
   if (light.kind != LIGHT_AREA) {
     return light_round_unshadowed(light, P, N, source);
+  }
+  if (light_whole_rectangle(light, P)) {
+    return light_rectangle_unshadowed(light, P, N);
   }
   vec3 to_light = source - P;
   float squared = dot(to_light, to_light);

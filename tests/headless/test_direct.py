@@ -30,6 +30,7 @@ LIGHTS = {
     "sun_90_low": dict(SUN, angle=90 * DEGREES, position=(3, 0, 1.0), target=(0, 0, 0)),
     "area_square": dict(kind="AREA", area_size=(0.8, 0.8)),
     "area_rectangle": dict(kind="AREA", area_shape="RECTANGLE", area_size=(0.4, 1.6), **TILTED),
+    "area_cut": dict(kind="AREA", area_size=(1.0, 1.0), position=(1.2, 0, 0.1), target=(0, 0, 0.1)),
     "area_disk": dict(kind="AREA", area_shape="DISK", area_size=(1.2, 1.2), **TILTED),
     "area_ellipse": dict(kind="AREA", area_shape="ELLIPSE", area_size=(0.5, 2.0)),
     "area_scaled": dict(kind="AREA", area_shape="ELLIPSE", area_size=(0.4, 0.8), scale=(2, 0.5, 3)),
@@ -70,18 +71,28 @@ def plane_picture(studio, lights, mode, samples=64, size=SIZE):
 @pytest.mark.parametrize("name", LIGHTS)
 def test_plane_is_lit_as_the_reference_says(studio, name, mode):
     lamp = make(LIGHTS[name])
-    edges = lamp.kind is LightKind.SPOT or lamp.area_spread < 3.0
+    edges = lamp.kind is LightKind.SPOT or lamp.area_spread < 3.0 or name == "area_cut"
     found, points = plane_picture(studio, [lamp], mode, 128 if edges else 64)
     normals = np.broadcast_to((0.0, 0.0, 1.0), points.shape)
     expected = irradiance(lamp, points, normals, 1024).reshape(found.shape) / math.pi
     # 128 samples leave noise where the edge of a cone or of slats crosses a pixel: there 2.5 % of the brightest, and
-    # 1 % of the level, as does a horizon that cuts a wide sun; elsewhere 1.5 % of each pixel.
+    # 1 % of the level, as does a horizon that cuts a wide sun or area; elsewhere 1.5 % of each pixel.
     assert found.sum() == pytest.approx(expected.sum(), rel=0.01)
     if (
         mode == "FILTERED"
     ):  # has an emitter point of its own in every pixel: the noise is the pixels', not the picture's
         found, expected = cells(found), cells(expected)
     np.testing.assert_allclose(found, expected, rtol=0.015, atol=(0.025 if edges else 0.002) * expected.max())
+
+
+@pytest.mark.parametrize("name", ["area_square", "area_rectangle", "area_cut"])
+def test_one_sample_of_a_filtered_rectangle_has_no_noise(studio, name):
+    """Its horizon cuts the last: half of it is below the plane."""
+    lamp = make(LIGHTS[name])
+    found, points = plane_picture(studio, [lamp], "FILTERED", 1)
+    normals = np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+    expected = irradiance(lamp, points, normals, 10_000).reshape(found.shape) / math.pi
+    np.testing.assert_allclose(found, expected, rtol=0.002, atol=0.001 * expected.max())
 
 
 @pytest.mark.parametrize("mode", ["SAMPLED", "FILTERED"])
