@@ -67,15 +67,14 @@ def material_program(plain: Shader, code: MaterialShader | None, passes: bool = 
     Where it draws meshes it gets their attributes from `uv_tx`, `uv_0_tx`, `color_1_tx`, …; a pass that does not, from
     attribute_tx, in the order of ``MaterialShader.mesh_fields`` for each point.
     """
-    passing = (*([("MATERIAL_PASSES", "1")] if passes else []), *([("MATERIAL_CULLS", "1")] if culls else []))
+    passing = _defines(PASSES=passes, CULLS=culls)
     if code is None:
         return replace(plain, defines=(*plain.defines, *passing)) if passing else plain
     meshes = "chunk_tx" in plain.samplers
     asks_view = any(FIELDS.get(need, "").find("material_view") >= 0 for need in code.needs)
     # Of fields that need the instance, those of a point are always there.
     asks_object = meshes and any(word in FIELDS.get(n, "") for n in code.needs for word in ("instance", "object_pos"))
-    named = [("MATERIAL_GRAPH", meshes), ("MATERIAL_OBJECT", asks_object)]
-    drawn = tuple((name, "1") for name, wanted in named if wanted)
+    drawn = _defines(GRAPH=meshes, OBJECT=asks_object)
     files = {"frame/material_lib.glsl": _evaluate(code, meshes)}
     varyings = dict(plain.varyings)
     samplers = {**plain.samplers, **code.samplers}
@@ -93,6 +92,10 @@ def material_program(plain: Shader, code: MaterialShader | None, passes: bool = 
         defines=(*plain.defines, *code.defines, *passing, *drawn),
         files={**plain.files, **files},
     )
+
+
+def _defines(**wanted: bool) -> tuple[tuple[str, str], ...]:
+    return tuple((f"MATERIAL_{name}", "1") for name, is_wanted in wanted.items() if is_wanted)
 
 
 def _evaluate(code: MaterialShader, meshes: bool) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,11 +71,10 @@ class Voxels:
             seen = self.grids[0].reached_from_outside if index else None
             draws = [d for d in visible_draws(gpu_scene, Visibility.SHADOW, seen) if _blocks(d, gpu_scene)]
             batches = gpu_scene.batches.of(gpu_scene, VOXEL_DRAW, draws, gpu_scene.lets_pass)
-            pieces = list(_pieces(batches))
-            for number, piece in enumerate(pieces, 1):
-                for axis in range(3):
-                    self._draw(gpu_scene, index, axis, piece)
-                    yield (index + (number + (axis - 2) / 3) / len(pieces)) / len(self.grids)
+            work = list(product(_pieces(batches), range(3)))
+            for done, (piece, axis) in enumerate(work, 1):
+                self._draw(gpu_scene, index, axis, piece)
+                yield (index + done / len(work)) / len(self.grids)
         self.built += 1
         self._holds = resolution, gpu_scene.revision
 
