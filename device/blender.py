@@ -90,7 +90,7 @@ class BlenderDevice(Device):
         try:
             self._begin(program, None, DrawState(), None)
             program.set(resources)
-            self._draw(program, None, 0, 3, 1)
+            self._draw(program, None, 3, 1)
         finally:
             self._end(program, None)
 
@@ -221,14 +221,14 @@ class BlenderDevice(Device):
         if self._backend == "OPENGL" and binding.touches_images(program.shader):
             self._barrier()
 
-    def _draw(self, program: Program, vertices: Vertices | None, first: int, count: int, instances: int) -> None:
+    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int) -> None:
         batch = self._attributeless if vertices is None else vertices.cache.get(None)
         if batch is None:
             raise ValueError(f"Shader {program.shader.name}: the vertices were freed")
         if vertices is not None:
             vertices.cache[program] = True  # its inputs were checked
         if instances == 1:
-            batch.draw_range(program.handle, elem_start=first, elem_count=count)
+            batch.draw_range(program.handle, elem_start=0, elem_count=count)
             return
         if vertices is None:
             batch = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=count)])
@@ -277,7 +277,7 @@ def _set_state(state: DrawState) -> None:
     gpu.state.depth_test_set(state.depth_test)
     gpu.state.depth_mask_set(state.depth_write)
     gpu.state.blend_set(_BLEND[state.blend])
-    gpu.state.face_culling_set(state.cull)
+    gpu.state.face_culling_set("NONE")
     gpu.state.color_mask_set(True, True, True, True)
 
 

@@ -85,12 +85,12 @@ class Drawing:
         self._device._busy = None
         self._device._end(self._program, self._target)
 
-    def __call__(self, vertices: Vertices | None = None, first: int = 0, count: int | None = None, instances: int = 1,
-                 **resources: Any) -> None:  # fmt: skip
-        """Draw ``count`` vertices (all that follow ``first``) ``instances`` times; gl_InstanceID counts from 0.
+    def __call__(
+        self, vertices: Vertices | None = None, count: int | None = None, instances: int = 1, **resources: Any
+    ) -> None:
+        """Draw all of ``vertices`` ``instances`` times; gl_InstanceID counts from 0.
 
-        ``vertices`` None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone. Instances
-        are of all that there is: Blender's instanced drawing takes no range.
+        None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone.
         """
         program = self._program
         if resources.keys() != self._rest:
@@ -103,19 +103,13 @@ class Drawing:
         else:
             if program not in vertices.cache:
                 _check_inputs(program.shader, vertices)
-            count = vertices.count - first if count is None else count
-            if first < 0 or count < 0 or first + count > vertices.count:
-                raise ValueError(
-                    f"Shader {program.shader.name}: corners {first}..{first + count} of {vertices.count} do not exist"
-                )
+            if count is not None:
+                raise ValueError(f"Shader {program.shader.name}: vertices are drawn whole, count is for draws without")
+            count = vertices.count
         if count % 3:
             raise ValueError(f"Shader {program.shader.name}: {count} corners are not whole triangles")
-        if instances > 1 and (first or (vertices is not None and count != vertices.count)):
-            raise ValueError(
-                f"Shader {program.shader.name}: corners {first}..{first + count} have no instances of their own"
-            )
         if count and instances:
-            self._device._draw(program, vertices, first, count, instances)
+            self._device._draw(program, vertices, count, instances)
 
 
 def _check_inputs(shader: Shader, vertices: Vertices) -> None:

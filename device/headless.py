@@ -162,9 +162,6 @@ class HeadlessDevice(Device):
         if state.blend != "NONE":
             flags |= moderngl.BLEND
             ctx.blend_func = _BLEND_FUNCTIONS[state.blend]
-        if state.cull != "NONE":
-            flags |= moderngl.CULL_FACE
-            ctx.cull_face = state.cull.lower()
         ctx.enable_only(flags)
 
     def _end(self, program: Program, target: Target | None) -> None:
@@ -175,12 +172,12 @@ class HeadlessDevice(Device):
         if binding.touches_images(program.shader):
             self._ctx.memory_barrier()
 
-    def _draw(self, program: Program, vertices: Vertices | None, first: int, count: int, instances: int) -> None:
+    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int) -> None:
         cache = self._attributeless if vertices is None else vertices.cache
         vertex_array = cache.get(program)
         if vertex_array is None:
             vertex_array = cache[program] = self._vertex_array(program, vertices)
-        vertex_array.render(moderngl.TRIANGLES, vertices=count, first=first, instances=instances)
+        vertex_array.render(moderngl.TRIANGLES, vertices=count, instances=instances)
 
     def _vertex_array(self, program: Program, vertices: Vertices | None) -> Any:
         content = []

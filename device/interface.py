@@ -96,7 +96,7 @@ class Device(ABC):
     # --- work --------------------------------------------------------------------------------------------------------
 
     def draw(self, shader: Shader, vertices: Vertices | None, target: Target, *, state: DrawState = _DEFAULT_STATE,
-             viewport: Viewport | None = None, first: int = 0, count: int | None = None, instances: int = 1,
+             viewport: Viewport | None = None, count: int | None = None, instances: int = 1,
              **resources: Any) -> None:  # fmt: skip
         """One draw. ``resources`` are all the names that the shader declares: samplers and images take a Texture,
         uniforms the array of Struct.pack(..., for_uniform=True), constants numbers or arrays (a MAT4 (4, 4) by rows).
@@ -107,7 +107,7 @@ class Device(ABC):
         program = self._program(shader)
         program.check_names(resources, tuple(program.setters))
         with Drawing(self, shader, target, state, viewport, resources) as drawing:
-            drawing(vertices, first, count, instances)
+            drawing(vertices, count, instances)
 
     def fullscreen(self, shader: Shader, target: Target, *, state: DrawState = _DEFAULT_STATE,
                    viewport: Viewport | None = None, **resources: Any) -> None:  # fmt: skip
@@ -201,7 +201,7 @@ class Device(ABC):
     @abstractmethod
     def _end(self, program: Program, target: Target | None) -> None: ...
     @abstractmethod
-    def _draw(self, program: Program, vertices: Vertices | None, first: int, count: int, instances: int) -> None: ...
+    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int) -> None: ...
     @abstractmethod
     def _dispatch(self, program: Program, groups: tuple[int, int, int], resources: Mapping[str, Any]) -> None: ...
     @abstractmethod

@@ -77,13 +77,11 @@ class DrawState:
     """Fixed-function state of a draw. ``depth_write`` needs a depth test; use "ALWAYS" to write without testing.
 
     blend: "ADDITIVE" is dst + src in all four channels, "MULTIPLY" dst * src, "ALPHA_PREMULT" src + dst * (1 - src.a).
-    cull: the faces left out; counter-clockwise is the front.
     """
 
     depth_test: str = "NONE"
     depth_write: bool = False
     blend: str = "NONE"
-    cull: str = "NONE"
 
     def __post_init__(self):
         for what, value, allowed in (
@@ -93,7 +91,6 @@ class DrawState:
                 ("NONE", "LESS", "LESS_EQUAL", "EQUAL", "GREATER", "GREATER_EQUAL", "ALWAYS"),
             ),
             ("blend", self.blend, ("NONE", "ADDITIVE", "MULTIPLY", "ALPHA_PREMULT")),
-            ("cull", self.cull, ("NONE", "BACK", "FRONT")),
         ):
             if value not in allowed:
                 raise ValueError(f"DrawState: {what} {value!r} is none of {', '.join(allowed)}")

@@ -53,7 +53,7 @@ def test_draw_to_current_fills_the_viewport(device, screen):
 
 def test_work_leaves_framebuffer_viewport_and_state_alone(device, screen):
     target = canvas(device, (16, 16), depth=True)
-    state = DrawState(depth_test="LESS_EQUAL", depth_write=True, blend="ADDITIVE", cull="BACK")
+    state = DrawState(depth_test="LESS_EQUAL", depth_write=True, blend="ADDITIVE")
     device.fullscreen(FADE, target, state=state, viewport=(1, 2, 3, 4), pc_blue=1.0)
     device.clear(target, viewport=(0, 0, 2, 2))
     device.read(target.colors[0])

@@ -97,29 +97,13 @@ def test_attribute_that_the_compiler_drops_is_accepted(device):
 
 def test_instances_count_from_0(device):
     vertices = quads(device, quad(-1, -1, -0.75, 1), quad(-0.75, -1, -0.5, 1), values=[1.0] * 6 + [2.0] * 6)
-    target, rest = canvas(device), {"instances": 3, "pc_offset": (0.5, 0), "pc_matrix": np.eye(4)}
-    device.draw(TRIANGLES, vertices, target, **rest)
+    target = canvas(device)
+    device.draw(TRIANGLES, vertices, target, instances=3, pc_offset=(0.5, 0), pc_matrix=np.eye(4))
     expected = np.zeros((2, 8))
     for instance in range(3):
         for start in (0, 1):
             expected[:, 2 * instance + start] = start + 1, instance
     np.testing.assert_array_equal(device.read(target.colors[0])[0].T[[0, 2]], expected)
-    for first, count in ((6, 6), (6, None), (0, 6)):
-        with pytest.raises(ValueError, match="triangles.*instances"):
-            device.draw(TRIANGLES, vertices, target, first=first, count=count, **rest)
-
-
-def test_range_of_corners(device):
-    vertices = quads(device, quad(-1, -1, 0, 1), quad(0, -1, 1, 1))
-    target = canvas(device)
-    device.draw(TRIANGLES, vertices, target, first=6, count=6, pc_offset=(0, 0), pc_matrix=np.eye(4))
-    values = device.read(target.colors[0])
-    np.testing.assert_array_equal(values[0, :, 0], [0, 0, 0, 0, 1, 1, 1, 1])
-    # The number of a corner does not depend on where a draw begins: 8 and 11 are last in the second quad.
-    assert set(values[:, 4:, 1].ravel()) == {8008, 11011}
-    for first, count in ((0, 13), (-1, 3), (12, 3)):
-        with pytest.raises(ValueError, match="triangles.*of 12"):
-            device.draw(TRIANGLES, vertices, target, first=first, count=count, pc_offset=(0, 0), pc_matrix=np.eye(4))
 
 
 def test_no_vertices_draw_nothing(device):
@@ -216,16 +200,6 @@ def test_fragment_writes_depth(device):
     np.testing.assert_allclose(device.read(target.depth)[0, :, 0], (np.arange(8) + 0.5) / 8, atol=1e-6)
 
 
-@pytest.mark.parametrize(("cull", "expected"), [("NONE", (1, 2)), ("BACK", (1, 0)), ("FRONT", (0, 2))])
-def test_counter_clockwise_is_the_front(device, cull, expected):
-    clockwise = quad(0, -1, 1, 1)[::-1]
-    vertices = quads(device, quad(-1, -1, 0, 1), clockwise, values=[1.0] * 6 + [2.0] * 6)
-    target = canvas(device)
-    state = DrawState(cull=cull)
-    device.draw(TRIANGLES, vertices, target, state=state, pc_offset=(0, 0), pc_matrix=np.eye(4))
-    np.testing.assert_array_equal(device.read(target.colors[0])[0, [0, 7], 0], expected)
-
-
 # --- targets ---------------------------------------------------------------------------------------------------------
 
 
@@ -294,19 +268,19 @@ def test_fragment_stores_to_a_volume(device):
 
 
 def test_drawing_equals_draw(device):
-    vertices = quads(device, quad(-1, -1, -0.5, 1), quad(-0.5, -1, 0, 0))
-    draws = [(0, 6, 1, np.eye(4)), (6, 6, 1, np.diag([1, 0.5, 1, 1])), (0, None, 2, np.diag([1, 0.25, 1, 1]))]
+    one, other = quads(device, quad(-1, -1, -0.5, 1)), quads(device, quad(-0.5, -1, 0, 0))
+    draws = [(one, 2, np.eye(4)), (other, 2, np.diag([1, 0.5, 1, 1])), (one, 2, np.diag([0, 0, 0, 1]))]
     pictures = []
     for fast in (True, False):
         target = canvas(device)
         if fast:
             with device.drawing(TRIANGLES, target, viewport=(0, 0, 8, 2), pc_offset=(0.5, 0)) as draw:
-                for first, count, instances, matrix in draws:
-                    draw(vertices, first, count, instances, pc_matrix=matrix)
+                for vertices, instances, matrix in draws:
+                    draw(vertices, instances=instances, pc_matrix=matrix)
         else:
-            for first, count, instances, matrix in draws:
-                device.draw(TRIANGLES, vertices, target, viewport=(0, 0, 8, 2), first=first, count=count,
-                            instances=instances, pc_offset=(0.5, 0), pc_matrix=matrix)  # fmt: skip
+            for vertices, instances, matrix in draws:
+                device.draw(TRIANGLES, vertices, target, viewport=(0, 0, 8, 2), instances=instances,
+                            pc_offset=(0.5, 0), pc_matrix=matrix)  # fmt: skip
         pictures.append(device.read(target.colors[0]))
     np.testing.assert_array_equal(*pictures)
     assert pictures[0].any()
@@ -322,10 +296,11 @@ def test_drawing_switches_textures_from_draw_to_draw(device):
         },
     )  # fmt: skip
     one, two, ten = (device.texture((1, 1), "RGBA32F", np.full((1, 1, 4), v, np.float32)) for v in (1, 2, 10))
-    target, vertices = canvas(device), quads(device, quad(-1, -1, 0, 1), quad(0, -1, 1, 1))
+    target = canvas(device)
+    left, right = quads(device, quad(-1, -1, 0, 1)), quads(device, quad(0, -1, 1, 1))
     with device.drawing(shader, target, b_tx=ten) as draw:
-        draw(vertices, 0, 6, a_tx=one)
-        draw(vertices, 6, 6, a_tx=two)
+        draw(left, a_tx=one)
+        draw(right, a_tx=two)
     np.testing.assert_array_equal(device.read(target.colors[0])[0, :, 0], [11] * 4 + [12] * 4)
 
 

@@ -87,7 +87,9 @@ def test_wrong_vertices_raise(device):
     with pytest.raises(TypeError, match="triangles.*in_id is INT"):
         device.draw(TRIANGLES, device.vertices(arrays), target, **rest)
     with pytest.raises(ValueError, match="triangles.*4 corners"):
-        device.draw(TRIANGLES, quads(device, quad(-1, -1, 1, 1)), target, count=4, **rest)
+        device.draw(TRIANGLES, quads(device, np.zeros((4, 3))), target, **rest)
+    with pytest.raises(ValueError, match="triangles.*count"):
+        device.draw(TRIANGLES, quads(device, quad(-1, -1, 1, 1)), target, count=3, **rest)
     with pytest.raises(ValueError, match="unequal"):
         device.vertices({"in_position": np.zeros((3, 3)), "in_value": np.zeros(4)})
 
