@@ -78,6 +78,30 @@ BAKE_SETTINGS = (
         unit="bounces",
     ),
     Setting(
+        "bake_points",
+        "INT",
+        "Detail Points",
+        "At most so many points inside the triangles of an object, where its vertices do not tell what lies between "
+        "them: a shadow in the middle of a floor of one square. More shows sharper shadows, at the cost of time and "
+        "memory in proportion to those that are found; 0 bakes vertices alone. The mesh stays as it is",
+        2048,
+        minimum=0,
+        maximum=262144,
+        unit="points an object",
+    ),
+    Setting(
+        "bake_detail",
+        "FLOAT",
+        "Detail Error",
+        "Which error between the vertices is left alone, as a part of what an open place receives. Higher is quicker "
+        "and takes less memory; lower takes more of Detail Points, for shadows with less blur",
+        0.05,
+        minimum=0.0,
+        maximum=1.0,
+        unit="parts of what an open place receives",
+        soft_maximum=0.2,
+    ),
+    Setting(
         "bake_error",
         "FLOAT",
         "Error",

@@ -9,6 +9,7 @@ import numpy as np
 
 from .bake.light import Surroundings
 from .bake.live import Live, make_live
+from .bake.refine import tree
 from .bake.surfaces import frame_of, mesh_vertices
 from .bake.view_table import LOBES, weights
 from .device.interface import Device, Target
@@ -75,16 +76,15 @@ class BakedLight:
             if self._shown.get(instance.key) != (instance.transfer, *numbers):
                 self._shown[instance.key] = (instance.transfer, *numbers)
                 self._objects.set_light(name, _signed(live.coefficient(*numbers)))
-            objects.append(
-                self._objects.object(instance.mesh, name, instance.world_from_object, np.eye(3), bounces=live.bounces)
-            )
+            place = (instance.mesh, name, instance.transfer, instance.world_from_object, np.eye(3))
+            objects.append(self._objects.object(*place, bounces=live.bounces))
         self._objects.show(inputs, objects, target)
 
     def end_view(self) -> None:
         """Give back what a view made."""
         if self._shown:
             self._shown.clear()
-            self._objects.keep({i.mesh for i in self._lit}, {i.key for i in self._lit})
+            self._keep(self._lit)
 
     def free(self) -> None:
         self._objects.free()
@@ -107,7 +107,7 @@ class BakedLight:
             self._objects.set_light(instance.key, answer, live.look, live.views)
             self._answered[instance.key] = question
             self.updates += 1
-        place = (instance.mesh, instance.key, instance.world_from_object, frame)
+        place = (instance.mesh, instance.key, instance.transfer, instance.world_from_object, frame)
         return self._objects.object(*place, bounces=live.bounces)
 
     def _prepare(self, scene: Scene, instance: Instance) -> Live:
@@ -117,15 +117,21 @@ class BakedLight:
             self._objects.add_mesh(mesh.key, mesh.positions, mesh_vertices(mesh)[1])
         if instance.transfer not in self._live:
             self._live[instance.transfer] = make_live(scene.transfers[instance.transfer])
-        return self._live[instance.transfer]
+        live = self._live[instance.transfer]
+        if live.splits is not None and not self._objects.has_tree(instance.transfer):
+            self._objects.add_tree(instance.transfer, tree(live.splits, mesh.triangle_count))
+        return live
 
     def _forget(self, lit: list[Instance]) -> None:
         """Give back what is no longer drawn."""
         keys, transfers = {i.key for i in lit}, {i.transfer for i in lit}
-        self._objects.keep({i.mesh for i in lit}, keys)
+        self._keep(lit)
         self._lit, self._shown = lit, {}
         self._answered = {key: question for key, question in self._answered.items() if key in keys}
         self._live = {key: live for key, live in self._live.items() if key in transfers}
+
+    def _keep(self, lit: list[Instance]) -> None:
+        self._objects.keep({i.mesh for i in lit}, {i.key for i in lit}, {i.transfer for i in lit})
 
 
 def _is_lit(instance: Instance) -> bool:

@@ -58,7 +58,7 @@ class TransferBake:
         self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside(self._blend)
         try:
             scene = convert_scene(depsgraph, for_viewport=True)
-            files = self._assign(scene, list(objects))
+            files = self._assign(scene, list(objects), warns=not settings.points)
             self.process = BakeProcess(scene, files, settings)
         except BaseException:
             self._clean()
@@ -90,8 +90,8 @@ class TransferBake:
         self.process.close()
         self._clean()
 
-    def _assign(self, scene, objects: Sequence) -> dict[Hashable, Path]:
-        """Which file each object's instance goes to."""
+    def _assign(self, scene, objects: Sequence, *, warns: bool) -> dict[Hashable, Path]:
+        """Which file each object's instance goes to. ``warns``: of vertices that are not enough."""
         if not objects:
             raise SceneError("No object to bake: select some that have a surface")
         self._targets: list[_Target] = []
@@ -106,11 +106,11 @@ class TransferBake:
             target = _Target(uid, obj.name, self._folder / _file_name(obj.name, {t.file.name for t in self._targets}))
             self._targets.append(target)
             files[instance.key] = target.file
-            if _is_coarse(scene, instance):
+            if warns and _is_coarse(scene, instance):
                 count = len(mesh_vertices(scene.meshes[instance.mesh])[0])
                 self.warnings.append(
-                    f"Object '{obj.name}' has {count} vertices: baked light is as fine as the mesh, subdivide it to "
-                    "see shadows on it"
+                    f"Object '{obj.name}' has {count} vertices: baked light is as fine as the mesh. Raise Detail "
+                    "Points, or subdivide it, to see shadows on it"
                 )
         if not self.pack:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -205,6 +205,8 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
         "WAVELET_GLOSSY": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
+    if "points" in about:
+        lines.append(f"{about['points']:,} points inside triangles, errors up to {about['detail_error']:.0%} are left")
     if "device" in about:
         lines.append(f"Baked on {about['device']}")
     if "roughness" in about:

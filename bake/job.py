@@ -18,6 +18,7 @@ from .file import Bake
 from .glossy import glossy, turn_matrices, what_is_seen
 from .haar import SparseRows
 from .occlusion import Caster, make_caster
+from .refine import Detail, refine, with_details
 from .separable import LOBES, factor, tangents
 from .surfaces import Surfaces, frame_of, gather, mesh_fingerprint
 from .transfer import Progress, Sampling, diffuse, scaled
@@ -27,6 +28,8 @@ _logger = logging.getLogger("rebound")  # by name: as an extension the package i
 
 # Roughnesses that look alike.
 _SAME_ROUGHNESS = 0.02
+# Of the time of a bake, the part that finding points inside triangles is said to take.
+_DETAIL_PART = 0.15
 
 
 class Kind(Enum):
@@ -56,6 +59,10 @@ class BakeSettings:
     error: float = 0.01  # GLOSSY, WAVELET_GLOSSY's bounces: root mean square error of the compression, of the length
     texels: int = 32  # WAVELET...: a power of two, up to 64; along a side of a face of the light's cube map
     keep: float = 0.999  # WAVELET...: the part of each row's energy that is kept
+    points: int = 0  # at most so many inside an object's triangles, where its vertices do not tell what is between them
+    detail: float = (
+        0.05  # with points: which error between the vertices is left, in parts of what an open place receives
+    )
     rays: str = ""  # "embree", "numpy", or "" for the better one there is
 
     def __post_init__(self) -> None:
@@ -64,6 +71,8 @@ class BakeSettings:
         limits |= {
             "bounces": (0, 64),
             "cuts": (0, 256),
+            "points": (0, 1 << 20),
+            "detail": (0, 1),
             "error": (0, 1),
             "keep": (0, 1),
             "texels": (1, 64),
@@ -148,12 +157,21 @@ def bake_objects(
     device = f"CPU, rays by {caster.name}"
     yield Progress(0.0, "shadows", device)
     instances = [by_key[key] for key in keys]
+    details, start = {}, 0.0
+    if settings.points:
+        start = _DETAIL_PART
+        details = yield from scaled(_details(scene, surfaces, caster, instances, settings), 0.0, start)
+        surfaces = with_details(surfaces, details)
     if settings.kind is Kind.DIFFUSE:
-        found = yield from _diffuse(surfaces, caster, instances, settings)
+        work = _diffuse(surfaces, caster, instances, settings)
     else:
-        found = yield from _one_by_one(scene, surfaces, caster, instances, settings)
-    facts = {"device": device}
-    return {key: Bake(_about(scene, key, settings) | facts | more, arrays) for key, (more, arrays) in found.items()}
+        work = _one_by_one(scene, surfaces, caster, instances, settings)
+    found = yield from scaled(work, start, 1.0 - start)
+    bakes = {}
+    for key, (more, arrays) in found.items():
+        inside, splits = _of_detail(details.get(key))
+        bakes[key] = Bake(_about(scene, key, settings) | {"device": device} | inside | more, arrays | splits)
+    return bakes
 
 
 Found = dict[Hashable, tuple[dict[str, Any], dict[str, Array]]]
@@ -170,17 +188,34 @@ def _sampling(settings: BakeSettings) -> Sampling:
     return Sampling(settings.bands, settings.directions, settings.shadows, settings.bounces)
 
 
-def _rows(surfaces: Surfaces, instance: Instance) -> Array:
-    run = surfaces.runs[instance.key]
-    return np.arange(run.start, run.stop)
+def _details(
+    scene: Scene, surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
+) -> Generator[Progress, None, dict[Hashable, Detail]]:
+    """Of the objects whose vertices are not enough."""
+    sampling, found = _sampling(settings), {}
+    if settings.kind in (Kind.WAVELET, Kind.WAVELET_GLOSSY):
+        sampling = replace(sampling, bands=sh.MAX_BANDS)  # which has no end there
+    for number, instance in enumerate(instances):
+        work = refine(scene, surfaces, caster, instance, sampling, settings.points, settings.detail)
+        detail = yield from scaled(work, number / len(instances), 1.0 / len(instances))
+        if detail is not None:
+            found[instance.key] = detail
+    return found
+
+
+def _of_detail(detail: Detail | None) -> tuple[dict[str, Any], dict[str, Array]]:
+    """What a file says of the points inside triangles, and has of them."""
+    if detail is None:
+        return {}, {}
+    return {"points": len(detail.origins), "detail_error": detail.error}, {"splits": detail.splits}
 
 
 def _diffuse(
     surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
 ) -> Generator[Progress, None, Found]:
-    rows = np.sort(np.concatenate([_rows(surfaces, instance) for instance in instances]))
+    rows = np.sort(np.concatenate([surfaces.rows(instance.key) for instance in instances]))
     transfer = yield from diffuse(surfaces, caster, _sampling(settings), rows)
-    turned = ((i, sh.rotate(transfer[surfaces.runs[i.key]], frame_of(i.world_from_object).T)) for i in instances)
+    turned = ((i, sh.rotate(transfer[surfaces.rows(i.key)], frame_of(i.world_from_object).T)) for i in instances)
     return {instance.key: ({}, {"diffuse": vectors.astype(np.float16)}) for instance, vectors in turned}
 
 
@@ -207,7 +242,7 @@ def _one_by_one(
 def _glossy(
     surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
-    rows = _rows(surfaces, instance)
+    rows = surfaces.rows(instance.key)
     bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows, seen)
     matrices = yield from scaled(bake, 0.0, 0.8)
     matrices = turn_matrices(matrices, frame_of(instance.world_from_object))
@@ -227,7 +262,7 @@ def _compressed(matrices: Array, error: float) -> Generator[Progress, None, tupl
 def _wavelet(
     surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, lit: Array | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
-    frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
+    frame, rows = frame_of(instance.world_from_object), surfaces.rows(instance.key)
     work = wavelet(surfaces, caster, settings.texels, settings.keep, frame, rows, settings.shadows)
     sparse, _ = yield from scaled(work, 0.0, 0.8)
     arrays = _sparse_arrays("", sparse)
@@ -240,7 +275,7 @@ def _wavelet(
 def _wavelet_glossy(
     scene: Scene, surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
-    frame, rows = frame_of(instance.world_from_object), _rows(surfaces, instance)
+    frame, rows = frame_of(instance.world_from_object), surfaces.rows(instance.key)
     roughness, apart = roughness_of(scene, instance)
     if apart > _SAME_ROUGHNESS:
         _logger.warning(

@@ -19,7 +19,8 @@ from .sphere import Array
 class Live:
     """One bake, laid out so that a light is answered quickly.
 
-    ``coefficients``: numbers of result a vertex and colour. ``look``: what they are.
+    ``coefficients``: numbers of result a vertex and colour. ``look``: what they are. Behind the vertices come the
+    points inside triangles that ``splits`` lead to (refine.Detail).
     """
 
     coefficients = 1
@@ -29,9 +30,10 @@ class Live:
     def __init__(self, transfer: Transfer) -> None:
         settings = transfer.about["settings"]
         self.bounces = bool(settings["bounces"] and settings["shadows"])  # whether light that bounced is in it
+        self.splits: Array | None = transfer.arrays.get("splits")
 
     def answer(self, light: Surroundings, frame: Array, bands: int, window: float, terms: int) -> Array:
-        """(vertices, coefficients, 3) float32 for an object whose axes are ``frame`` (surfaces.frame_of).
+        """(vertices and points, coefficients, 3) float32 for an object whose axes are ``frame`` (surfaces.frame_of).
 
         ``bands`` at most are used of harmonics, ``terms`` of wavelets. See ``Surroundings.harmonics`` for ``window``.
         """

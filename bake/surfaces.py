@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..scene.data import Array, Image, Instance, Material, Mesh, Scene, Visibility
 
 # Rays leave the surface by this part of the object's size, so that they do not hit the triangle they start on.
-_LIFT = 1e-4
+LIFT = 1e-4
 # And from beside the vertex, along the surface, by this part of the way to the middles of its triangles: a floor's
 # corner lies in the planes of two walls, and rays from there would pass behind them.
-_INWARDS = 0.01
+INWARDS = 0.01
 # A triangle is cut into at most so many by so many.
 _MOST_CUTS = 64
 # Where in a triangle its colour is looked up: four points a side's worth, as barycentric coordinates.
@@ -33,6 +33,14 @@ class Surfaces:
     positions: Array  # (V, 3) float64, world space, lifted off the surface: where rays start
     normals: Array  # (V, 3) float64, world space, unit
     runs: Mapping[Hashable, slice]  # Instance.key -> its rows of the vertex arrays; behind them are those of pieces
+    inside: Mapping[Hashable, slice] = field(
+        default_factory=dict
+    )  # and rows of points inside its triangles (refine.py)
+
+    def rows(self, key: Hashable) -> Array:
+        """Ascending: of the vertices of an instance, then of the points inside its triangles."""
+        runs = [self.runs[key], self.inside.get(key, slice(0, 0))]
+        return np.concatenate([np.arange(run.start, run.stop) for run in runs])
 
 
 def mesh_vertices(mesh: Mesh) -> tuple[Array, Array]:
@@ -156,7 +164,7 @@ def _placed(mesh: Mesh, matrix: Array, first: Array, vertices: Array) -> tuple[A
     inwards = np.stack([np.bincount(vertices, axis, len(first)) for axis in middles.T], axis=-1) / meeting[:, None]
     inwards -= points[first]
     inwards -= (inwards * normals).sum(axis=1, keepdims=True) * normals
-    return points.reshape(-1, 3, 3), points[first] + normals * (_LIFT * size) + _INWARDS * inwards, normals
+    return points.reshape(-1, 3, 3), points[first] + normals * (LIFT * size) + INWARDS * inwards, normals
 
 
 def _facing(corners: Array, normals: Array) -> Array:

@@ -10,13 +10,14 @@ P.-P. Sloan, J. Kautz, J. Snyder, "Precomputed Radiance Transfer", SIGGRAPH 2002
    multiplied with the factors of the view.
 3. What was drawn is added to the direct light. The G-buffer's position is marked, so that no technique adds the sky.
 
-Limits: docs/prt.md. Between the vertices light is mixed, so it is as fine as the mesh.
+Limits: docs/prt.md. Between the vertices, and the points inside triangles that a bake may have, light is mixed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,12 +25,10 @@ from ...device.interface import Device, DrawState, Target, Texture, Vertices
 from ..frame.draws import ADD
 from ..frame.inputs import HAS_SKY, HAS_SKY_BOUNCES, HAS_SKY_MIRRORED, FrameInputs, LightTargets
 from ..frame.shaders import RESOLVE
-from .shaders import DRAW, PRT_DRAW, SHADERS, Look
+from .shaders import DRAW, PRT_DRAW, ROW_TEXELS, SHADERS, Look
 
 __all__ = ["SHADERS", "BakedObject", "BakedObjects", "Look"]
 
-# Texels in a row of a texture of vertices.
-ROW_TEXELS = 2048
 # What a view of bakes shows where there is none.
 NOT_BAKED = (0.05, 0.05, 0.05)
 # Nothing else: what is seen through an object that lets light pass has its own light.
@@ -55,16 +54,18 @@ class BakedObject:
     frame: np.ndarray  # (3, 3): the axes of the bake in the world
     vertices: Vertices
     light: _Light
+    tree: Texture | None  # where light has points inside triangles
     has: int  # HAS_... bits of frame.inputs
 
 
 class BakedObjects:
-    """The passes and what they keep on the GPU. Meshes and lights are told by name, and given back when not told."""
+    """The passes and what they keep on the GPU. Meshes, lights, trees are told by name; given back when not told."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._meshes: dict[Hashable, Vertices] = {}
         self._lights: dict[Hashable, _Light] = {}
+        self._trees: dict[Hashable, Texture] = {}
         self._lobes: Texture | None = None
         self._pictures: Target | None = None  # diffuse, glossy
         self._target: Target | None = None  # the G-buffer's position, and those
@@ -97,25 +98,46 @@ class BakedObjects:
         table = None if views is None else self.device.texture(views.shape[1::-1], "RGBA32F", views)
         self._lights[key] = _Light(texture, look, coefficients, texels, table)
 
+    def has_tree(self, key: Hashable) -> bool:
+        return key in self._trees
+
+    def add_tree(self, key: Hashable, nodes: np.ndarray) -> None:
+        """(nodes, 4) float32: the cuts of a mesh's triangles, as of bake.refine.tree."""
+        height = -(-len(nodes) // ROW_TEXELS)
+        filled = np.zeros((height * ROW_TEXELS, 4), np.float32)
+        filled[: len(nodes)] = nodes
+        self._trees[key] = self.device.texture((ROW_TEXELS, height), "RGBA32F", filled.reshape(height, ROW_TEXELS, 4))
+
     def set_lobes(self, table: np.ndarray) -> None:
         """(views, LOBE_TEXELS roughnesses, 4) of LOBES_SIDE a side: see prt_weights() in prt_harmonics_frag.glsl."""
         self.device.free(self._lobes)
         self._lobes = self.device.texture((table.shape[1], table.shape[0]), "RGBA32F", table.astype(np.float32))
 
     def object(
-        self, mesh: Hashable, light: Hashable, world_from_object: np.ndarray, frame: np.ndarray, *, bounces: bool
+        self,
+        mesh: Hashable,
+        light: Hashable,
+        tree: Hashable,
+        world_from_object: np.ndarray,
+        frame: np.ndarray,
+        *,
+        bounces: bool,
     ) -> BakedObject:
-        """Of a mesh and a light that were told before. ``bounces``: whether the bake has light that bounced."""
+        """Of a mesh and a light that were told before, and a tree if it was. ``bounces``: whether the bake has light
+        that bounced.
+        """
         of_vertices = self._lights[light]
         has = HAS_SKY | HAS_SKY_MIRRORED * (of_vertices.look is not Look.MATT) | HAS_SKY_BOUNCES * bounces
-        return BakedObject(world_from_object, frame, self._meshes[mesh], of_vertices, has)
+        return BakedObject(world_from_object, frame, self._meshes[mesh], of_vertices, self._trees.get(tree), has)
 
-    def keep(self, meshes: set[Hashable], lights: set[Hashable]) -> None:
+    def keep(self, meshes: set[Hashable], lights: set[Hashable], trees: set[Hashable]) -> None:
         """Give everything else back."""
         for key in self._meshes.keys() - meshes:
             self.device.free(self._meshes.pop(key))
         for key in self._lights.keys() - lights:
             self._free_light(key)
+        for key in self._trees.keys() - trees:
+            self.device.free(self._trees.pop(key))
 
     def draw(
         self, inputs: FrameInputs, objects: list[BakedObject], targets: LightTargets, *, glossy: bool, seen=(True, True)
@@ -155,16 +177,18 @@ class BakedObjects:
                 "texels": light.texels,
                 "coefficients": light.coefficients,
             }
-            lobe = light.views or self._lobes
-            looks = {"normal_tx": inputs.gbuffer.normal, "specular_tx": inputs.gbuffer.specular, "lobe_tx": lobe}
+            given: dict[str, Any] = {} if one.tree is None else {"tree_tx": one.tree}
+            if light.look is not Look.MATT:
+                given |= {"normal_tx": inputs.gbuffer.normal, "specular_tx": inputs.gbuffer.specular}
+                given["lobe_tx"] = light.views or self._lobes
             self.device.draw(
-                DRAW[light.look],
+                DRAW[light.look, one.tree is not None],
                 one.vertices,
                 over,
                 state=OVER_GBUFFER,
                 light_tx=light.texture,
                 prt_draw=PRT_DRAW.pack([block], for_uniform=True),
-                **(looks if light.look is not Look.MATT else {}),
+                **given,
             )
         diffuse, mirrored = pictures.colors
         return diffuse, mirrored
@@ -175,7 +199,7 @@ class BakedObjects:
         self.device.free(light.views)
 
     def free(self) -> None:
-        self.keep(set(), set())
+        self.keep(set(), set(), set())
         self._free_targets()
         self.device.free(self._lobes)
         self._lobes = None

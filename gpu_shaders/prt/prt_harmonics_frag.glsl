@@ -2,6 +2,7 @@
  * cosine around the normal, and as a table over roughness and view says that the material is seen (Kautz, Sloan,
  * Snyder 2002). */
 #include "lib/sh_lib.glsl"
+#include "prt/prt_rows_lib.glsl"
 #include "prt/prt_surface_lib.glsl"
 
 /* The cosine lobe over pi, a factor a band (Ramamoorthi & Hanrahan 2001). */
@@ -53,17 +54,6 @@ void prt_seen(PrtSurface surface, mat3 local, out float seen[SH_MOST])
   seen[0] = at[0];
 }
 
-vec4 prt_mixed(int texel)
-{
-  vec4 sum = vec4(0.0);
-  for (int corner = 0; corner < 3; corner++) {
-    int vertex = v_triangle[corner];
-    ivec2 first = ivec2(vertex % prt_draw.row * prt_draw.texels, vertex / prt_draw.row);
-    sum += v_weights[corner] * texelFetch(light_tx, first + ivec2(texel, 0), 0);
-  }
-  return sum;
-}
-
 void main()
 {
   PrtSurface surface = prt_surface();
@@ -75,6 +65,9 @@ void main()
     prt_seen(surface, local, seen);
   }
 
+  ivec3 rows;
+  vec3 weights;
+  prt_find(rows, weights);
   /* Three numbers a coefficient, one after another in texels of four. */
   vec3 irradiance = vec3(0.0);
   vec3 radiance = vec3(0.0);
@@ -87,7 +80,7 @@ void main()
       int number = 3 * i + c;
       if (number / 4 != read) {
         read = number / 4;
-        numbers = prt_mixed(read);
+        numbers = mat3x4(prt_number(rows.x, read), prt_number(rows.y, read), prt_number(rows.z, read)) * weights;
       }
       value[c] = numbers[number % 4];
     }

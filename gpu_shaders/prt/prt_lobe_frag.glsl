@@ -1,13 +1,8 @@
 /* What a vertex reflects as a sum of products (Wang, Tran, Luebke 2004): the numbers that its light gave, each times a
  * function of the view along the vertex' own normal and tangent. Each corner is seen for itself, then they are mixed:
  * twin of Separable.of_view() in bake/separable.py. */
+#include "prt/prt_rows_lib.glsl"
 #include "prt/prt_surface_lib.glsl"
-
-vec4 prt_number(int vertex, int i)
-{
-  ivec2 first = ivec2(vertex % prt_draw.row * prt_draw.texels, vertex / prt_draw.row);
-  return texelFetch(light_tx, first + ivec2(i, 0), 0);
-}
 
 vec3 prt_mirrored(int vertex, vec3 V)
 {
@@ -39,11 +34,14 @@ void main()
 {
   PrtSurface surface = prt_surface();
   vec3 local = mat3(prt_draw.local_from_world) * surface.V;
+  ivec3 rows;
+  vec3 weights;
+  prt_find(rows, weights);
   vec3 irradiance = vec3(0.0);
   vec3 radiance = vec3(0.0);
   for (int corner = 0; corner < 3; corner++) {
-    irradiance += v_weights[corner] * prt_number(v_triangle[corner], 0).rgb;
-    radiance += surface.reflects ? v_weights[corner] * prt_mirrored(v_triangle[corner], local) : vec3(0.0);
+    irradiance += weights[corner] * prt_number(rows[corner], 0).rgb;
+    radiance += surface.reflects ? weights[corner] * prt_mirrored(rows[corner], local) : vec3(0.0);
   }
   prt_write(surface, irradiance, radiance);
 }

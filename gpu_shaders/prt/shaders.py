@@ -14,6 +14,11 @@ LOBE_TEXELS = -(-LOBE_BANDS * (LOBE_BANDS - 1) // 4)
 # Rows of the table of a lobe that is a sum of products (bake/separable.py).
 VIEWS = 64
 
+# Texels in a row of a texture of vertices, or of the cuts inside triangles (bake/refine.py).
+ROW_TEXELS = 2048
+# How often a pixel goes on to a half of its triangle: more than any is cut.
+DEEPEST = 64
+
 
 class Look(Enum):
     """What the numbers of a vertex are."""
@@ -38,21 +43,25 @@ PRT_DRAW = Struct(
 _DEFINES = {
     Look.MATT: (),
     Look.HARMONICS: (
-        ("MIXED", "1"),
         ("PRT_LOBES", str(LOBES_SIDE)),
         ("PRT_BANDS", str(LOBE_BANDS)),
         ("PRT_TEXELS", str(LOBE_TEXELS)),
     ),
-    Look.LOBE: (("MIXED", "1"), ("PRT_VIEWS", str(VIEWS))),
+    Look.LOBE: (("PRT_VIEWS", str(VIEWS)),),
 }
 
 
-def _draw(look: Look) -> Shader:
-    mixed = look is not Look.MATT
+def _draw(look: Look, refined: bool) -> Shader:
+    """``refined``: with points inside triangles."""
+    mirrors = look is not Look.MATT
+    mixed = mirrors or refined
     varyings = {"v_position": "VEC3"}
     varyings |= {"v_weights": "VEC3", "v_triangle": "flat IVEC4"} if mixed else {"v_light": "VEC3"}
+    defines = (("MIXED", "1"),) * mixed
+    if refined:
+        defines += (("REFINED", "1"), ("PRT_ROW", str(ROW_TEXELS)), ("PRT_DEEPEST", str(DEEPEST)))
     return Shader(
-        name=f"prt_draw_{look.value}",
+        name=f"prt_draw_{look.value}{'_refined' * refined}",
         vertex="prt/prt_draw_vert.glsl",
         fragment=f"prt/prt_{look.value}_frag.glsl",
         inputs={"in_position": "VEC3", "in_triangle": "IVEC3"},
@@ -60,14 +69,15 @@ def _draw(look: Look) -> Shader:
         outputs={"out_position": "VEC4", "out_diffuse": "VEC4", "out_glossy": "VEC4"},
         samplers={
             "light_tx": "FLOAT_2D",
-            **({"normal_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D", "lobe_tx": "FLOAT_2D"} if mixed else {}),
+            **({"normal_tx": "FLOAT_2D", "specular_tx": "FLOAT_2D", "lobe_tx": "FLOAT_2D"} if mirrors else {}),
+            **({"tree_tx": "FLOAT_2D"} if refined else {}),
         },
         uniforms={"prt_draw": PRT_DRAW},
-        defines=_DEFINES[look],
+        defines=(*defines, *_DEFINES[look]),
     )
 
 
-# By what the bake has.
-DRAW = {look: _draw(look) for look in Look}
+# By what the bake has, and whether some of it is inside triangles.
+DRAW = {(look, refined): _draw(look, refined) for look in Look for refined in (False, True)}
 
 SHADERS = tuple(DRAW.values())

@@ -30,7 +30,7 @@ LONG = BakeSettings(directions=65536, bounces=8)
 @pytest.fixture
 def saved(rebound_scene, tmp_path):
     """The scene in a file, with quick settings for bakes."""
-    rebound_scene.rebound.bake_directions = 64
+    rebound_scene.rebound.bake_directions, rebound_scene.rebound.bake_points = 64, 0
     for name in ("Floor", "Box"):
         bpy.data.objects[name].select_set(True)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"), check_existing=False)
@@ -58,6 +58,22 @@ def test_operator_bakes_the_selected_into_files_beside_the_blend(saved, tmp_path
 def test_coarse_mesh_is_warned_of(saved):
     lines = baking.bake([floor(), bpy.data.objects["Box"]], QUICK)
     assert len(lines) == 1 and "'Floor' has 4 vertices" in lines[0] and "subdivide" in lines[0]
+
+
+def test_points_inside_triangles_show_the_shadow_on_a_square(saved, tmp_path):
+    """The box hangs over the floor's middle, far from its corners."""
+    baking.bake([floor()], QUICK)
+    seen = {0: picture(render(saved, tmp_path / "a.exr"))}
+    saved.rebound.bake_points, saved.rebound.bake_detail = 200, 0.02
+    assert baking.bake([floor()]) == [], "no warning of four vertices"
+    seen[200] = picture(render(saved, tmp_path / "b.exr"))
+    found = read_bake(tmp_path / "a.bakes" / "Floor.transfer.exr")
+    assert 20 < found.about["points"] <= 200
+    assert len(found.arrays["diffuse"]) == 4 + found.about["points"]
+    assert state(floor()).unused == ""
+    assert any("points inside triangles" in line for line in baking.facts(state(floor()).about, 0))
+    darker = seen[200][..., 0] - seen[0][..., 0]
+    assert darker.min() < -0.006, "of 0.04, the floor's red under Blender's dark grey world"
 
 
 def test_bake_lights_the_instance_of_its_object(saved):

@@ -10,7 +10,9 @@ from rebound.bake.glossy import open_matrices
 from rebound.bake.job import BakeSettings, Kind
 from rebound.bake.light import Surroundings
 from rebound.bake.live import make_live
+from rebound.bake.refine import tree, walk
 from rebound.bake.sphere import quadrature
+from rebound.bake.surfaces import mesh_vertices
 from rebound.scene.data import Material, Visibility, World
 from rebound.tests.support.bake_scenes import grid
 from rebound.tests.support.baked_scenes import baked
@@ -159,6 +161,75 @@ def test_objects_that_take_no_indirect_light_take_no_baked_one(studio):
     instances = tuple(replace(i, visibility=alone[i.key]) for i in BAKED.instances)
     assert picture(studio, replace(BAKED, instances=instances))[surface(studio)].max() == 0.0
     assert picture(studio, BAKED, transfer_use=False)[surface(studio)].max() == 0.0
+
+
+# --- points inside triangles ------------------------------------------------------------------------------------------
+
+DETAIL = replace(QUICK, directions=1024, bounces=0, points=512, detail=0.03)
+FROM_ABOVE = ortho(40, 40, 3.6)
+
+
+def ball_on_square(cells=1, **fields):
+    return scene([grid("floor", 4.0, cells), sphere("ball", (0.3, 0.2, 0.9), 0.4)], world=SKY, **fields)
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_pixels_mix_the_points_around_them(studio, kind):
+    """From above, pixel by pixel: the twin of the shader's way down the cuts."""
+    shiny = [Material("Shiny", (0.8, 0.8, 0.8), specular=(0.04, 0.04, 0.04), roughness=0.6)] * 2
+    shown = ball_on_square(**({"materials": shiny} if "GLOSSY" in kind.value else {}))
+    shown = baked(shown, replace(DETAIL, kind=kind, texels=16, bands=4, result_bands=3, points=128), ["floor"])
+    found = studio.render(shown, FROM_ABOVE, 1, ("diffuse_direct", "position"), method="NONE", transfer_terms=6144)
+    mesh, (transfer,) = shown.meshes[shown.instances[0].mesh], shown.transfers.values()
+    live = make_live(transfer)
+    numbers = live.answer(Surroundings(np.array(SKY.color)), np.eye(3), 5, 0.0, 6144)
+    cosine = sh.evaluate(np.array([[0.0, 0.0, 1.0]]), 3)[0] * np.repeat([1.0, 2 / 3, 1 / 4], [1, 3, 5])
+    light = np.einsum("ric,i->rc", numbers, cosine) if kind is Kind.GLOSSY else numbers[:, 0]
+    seen = np.abs(found["position"][..., 2]) < 1e-4
+    seen &= found["diffuse_direct"][..., 0] > 0  # a pixel of the ball's rim has no whole floor
+    places = found["position"][seen][:, :2].astype(np.float64)
+    at, weights = within(mesh.positions, places)
+    rows = mesh_vertices(mesh)[1].reshape(-1, 3)
+    _, of, parts = walk(tree(live.splits, len(rows)), at, rows[at], weights)
+    right = (parts[:, :, None] * light[of]).sum(axis=1)
+    assert seen.sum() > 1000 and right[:, 0].min() < 0.9 * right[:, 0].max()
+    np.testing.assert_allclose(found["diffuse_direct"][seen], right, atol=2e-3)
+
+
+def within(corners, places):
+    """Which triangle of a floor each place (n, 2) is in, and the weights of its corners."""
+    triangles = corners.reshape(-1, 3, 3).astype(np.float64)[..., :2]
+    every = np.stack(
+        [
+            np.linalg.solve(np.vstack([t.T, np.ones(3)]), np.vstack([places.T, np.ones(len(places))])).T
+            for t in triangles
+        ]
+    )
+    at = every.min(axis=2).argmax(axis=0)
+    return at, every[at, np.arange(len(places))].clip(0.0)
+
+
+def test_square_with_points_is_the_picture_of_a_fine_mesh(studio):
+    """Means of squared differences over the squares: without points 6e-3."""
+    fine = picture(studio, baked(ball_on_square(64), replace(DETAIL, points=0)))
+    errors = {}
+    for points in (0, 512):
+        found = picture(studio, baked(ball_on_square(), replace(DETAIL, points=points)))
+        errors[points] = np.mean((found - fine) ** 2 / (fine**2 + 0.01))
+    assert errors[512] < 1e-4 and errors[0] > 30 * errors[512], errors
+
+
+def test_cuts_are_given_back_and_seen_by_the_view_of_a_coefficient(studio):
+    plain, cut = (baked(ball_on_square(), replace(DETAIL, points=points)) for points in (0, 128))
+    picture(studio, plain, 1)
+    before = studio.renderer.statistics()["gpu_bytes"]
+    shown = picture(studio, cut, 1, FROM_ABOVE, show="TRANSFER", show_term=0)
+    floor = shown[2:-2, 2:-2, 0]
+    assert floor.min() < 0.87, "the shadow is in the first coefficient"
+    picture(studio, cut, 1)
+    assert studio.renderer.statistics()["gpu_bytes"] > before
+    picture(studio, plain, 1)
+    assert studio.renderer.statistics()["gpu_bytes"] == before
 
 
 # --- what is worked out again -----------------------------------------------------------------------------------------
