@@ -61,7 +61,7 @@ class Vpl:
         self.pool = Pool(device)
         self.cache = Cache(device)
         self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
-        self._sorted = -1  # revision of the sources that the indices were made for
+        self._sorted: dict[str, tuple[int, int]] = {}  # how often points were drawn and voxels built for each index
         self.gathering = Gathering(device)
         self._settings: Mapping[str, Value] = {}  # of the last sample
         self._picture = 0  # number of the sample in its sequence of noise
@@ -131,24 +131,28 @@ class Vpl:
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
         count, seed = int(settings["pool"]), inputs.noise_seed(1)
-        if self._sorted != self.sources.revision:
-            for owner in self._indices:
-                self._sort_points(owner)
-            self._sorted = self.sources.revision
         tile = self.sources.tile_of(CACHE)
+        if tile is not None:
+            self.cache.emit(self.sources, tile)  # before they are sorted: points without light are left out
+        for owner in self._indices:
+            drawn = self.sources.points_drawn[owner], self.voxels.built
+            if self._sorted.get(owner) != drawn:
+                self._sort_points(owner)
+                self._sorted[owner] = drawn
         if tile is None:
             self.pool.draw(self.sources, count, MOST_WARM_UP * self._picture, seed)
             return
         many = settings["bounces"] == "MANY"
         rounds, rows = self.cache.plan(inputs.gpu_scene, many=many, rows=int(settings["cache_rows"]))
         kinds = ALL_KINDS if many else FIRST_HAND
-        self.cache.emit(self.sources, tile)
         for number in range(rounds):
             update = MOST_WARM_UP * self._picture + number
             self.pool.draw(self.sources, count, update, seed)
             candidates = self._candidates(inputs, settings, kinds=kinds, number=update)
-            if self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy):
+            have_light = self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy)
+            if have_light or self.cache.settles:
                 self.cache.emit(self.sources, tile)
+            if have_light:
                 self._sort_points(CACHE)
             yield (number + 1) / rounds
 

@@ -35,6 +35,8 @@ AFTER_EDIT, MOST_AFTER_EDIT = 2, 24
 NEWER = 0.5
 # Updates after which no more points come to light that had none, so that the index of them stays as it is.
 COME_TO_LIGHT = 4.0
+# While one edit follows another the index is made anew only after so many updates.
+SORTED_AFTER = 4.0
 
 
 class Cache:
@@ -49,6 +51,8 @@ class Cache:
         self._revision = -1  # of the scene that was last gathered in
         self._updates = 0.0  # of every point, of those that count; below 0: before light has bounced enough
         self._counts = 1.0  # part of them that a mean is of
+        self._gathered = 0.0  # updates since nothing was known
+        self._sorted = 0.0  # of these, when the index was made last
 
     @property
     def sky(self) -> Texture:
@@ -119,8 +123,15 @@ class Cache:
             pc_origin=place[:2],
         )
         self._next_row += rows
+        is_new = self._gathered < COME_TO_LIGHT
         before, self._updates = self._updates, self._updates + rows / place[3]
-        return before < COME_TO_LIGHT and math.floor(self._updates) > math.floor(before)
+        self._gathered += rows / place[3]
+        if before >= COME_TO_LIGHT or math.floor(self._updates) == math.floor(before):
+            return False
+        if not is_new and self._gathered - self._sorted < SORTED_AFTER:
+            return False
+        self._sorted = self._gathered
+        return True
 
     def forget(self) -> None:
         """Begin anew: the points are others, or the picture follows none."""
@@ -142,6 +153,7 @@ class Cache:
         self._clear()
 
     def _clear(self) -> None:
+        self._gathered = self._sorted = 0.0
         for *_, target in self._sums:
             self.device.clear(target)
 

@@ -25,26 +25,24 @@ class PointIndex:
         self.device = device
         self._grids: list[tuple[Texture, Target]] = []  # the newest first
         self.places = ((0.0, 0.0, 0.0, 0.0),)  # of each level's cube: lower corner, cells a metre
-        self._none = device.texture((1, 1), "R32F")
+        self._none = device.texture((1, 1), "RGBA32F")
 
     def update(self, sources: Sources, tile: MapTile, grids: Sequence[VoxelGrid]) -> None:
         """Sort the tile's points into the cells of cubes, one around each of the ``grids``, the innermost first."""
         self._fit(len(grids))
         self.places = tuple((*grid.origin, INDEX_CELLS / (grid.edge * float(grid.size.max()))) for grid in grids)
         x, y, side, _ = sources.points_viewport(tile)
-        shared = {"position_area_tx": sources.colors[0], "pc_origin": (x, y), "pc_side": side}
         target = self._grids[0][1]
         self.device.clear(target)
-        kinds = {"normal_kind_tx": sources.colors[1], "flux_tx": sources.colors[2]}
+        names = ("position_area_tx", "normal_kind_tx", "flux_tx")
+        points = {**dict(zip(names, sources.colors, strict=False)), "pc_origin": (x, y), "pc_side": side}
         for level, place in enumerate(self.places):
-            viewport = _viewport(level)
-            with self.device.drawing(INDEX_SCATTER, target, viewport=viewport, **kinds, **shared) as draw:
+            with self.device.drawing(INDEX_SCATTER, target, viewport=_viewport(level), **points) as draw:
                 draw(count=9 * side * side, pc_index=place)
         for _ in range(SPREAD):
             (old, _), (_, target) = self._grids
-            for level, place in enumerate(self.places):
-                given = {"index_tx": old, "pc_index": place, "pc_level": level}
-                self.device.fullscreen(INDEX_SPREAD, target, viewport=_viewport(level), **given, **shared)
+            for level in range(len(self.places)):
+                self.device.fullscreen(INDEX_SPREAD, target, viewport=_viewport(level), index_tx=old, pc_level=level)
             self._grids.reverse()
 
     @property
@@ -58,7 +56,7 @@ class PointIndex:
             return
         self._free_grids()
         for _ in range(2):
-            texture = self.device.texture(size, "R32F")
+            texture = self.device.texture(size, "RGBA32F")
             self._grids.append((texture, self.device.target([texture])))
 
     @property

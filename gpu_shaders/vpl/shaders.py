@@ -314,7 +314,7 @@ INDEX_SCATTER = Shader(
     name="vpl_index_scatter",
     vertex="vpl/vpl_index_scatter_vert.glsl",
     fragment="vpl/vpl_index_scatter_frag.glsl",
-    varyings={"v_point": "flat INT"},
+    varyings={"v_point": "flat VEC4"},
     outputs={"out_point": "VEC4"},
     samplers={"position_area_tx": "FLOAT_2D", "normal_kind_tx": "FLOAT_2D", "flux_tx": "FLOAT_2D"},
     constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT"},
@@ -325,8 +325,8 @@ INDEX_SPREAD = Shader(
     name="vpl_index_spread",
     fragment="vpl/vpl_index_spread_frag.glsl",
     outputs={"out_point": "VEC4"},
-    samplers={"index_tx": "FLOAT_2D", "position_area_tx": "FLOAT_2D"},
-    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT", "pc_level": "INT"},
+    samplers={"index_tx": "FLOAT_2D"},
+    constants={"pc_level": "INT"},
     defines=_INDEX,
 )
 

@@ -50,6 +50,7 @@ class Sources(ReflectiveShadowMaps):
     def __init__(self, device: Device) -> None:
         super().__init__(device)
         self.revision = 0
+        self.points_drawn: Counter[str] = Counter()  # how often, by their owner
         self.tile_table: Texture | None = None
         self._emitters = SurfacePoints(device, "EMISSION")
         self._cache = SurfacePoints(device, "AREA")
@@ -156,6 +157,7 @@ class Sources(ReflectiveShadowMaps):
         points = self._emitters if tile.owner == EMITTERS else self._cache
         place = self.points_viewport(tile)
         points.update(gpu_scene, place[2])
+        self.points_drawn[str(tile.owner)] += 1
         points.draw(gpu_scene, target, place)
 
 

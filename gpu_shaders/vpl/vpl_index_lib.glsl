@@ -1,7 +1,7 @@
 /* Which point of the cache, or of the emitters, lies near: a cube of VPL_INDEX cells along a side around the scene, six
  * sides of each cell for the ways that surfaces face; and ever wider cubes where huge objects reach beyond it. `cube` is its
  * lower corner and cells a metre. A flat texture has the six sides side by side, the cells' layers one above the other,
- * and the levels above one another again. */
+ * and the levels above one another again. A texel is the point's number and one, 0 for none, and its place in cells. */
 #include "lib/math_lib.glsl"
 
 const ivec2 INDEX_SIZE = ivec2(6 * VPL_INDEX, VPL_INDEX *VPL_INDEX);

@@ -1,4 +1,4 @@
 void main()
 {
-  out_point = vec4(float(v_point));
+  out_point = v_point;
 }

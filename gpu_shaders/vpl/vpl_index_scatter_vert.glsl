@@ -13,8 +13,8 @@ void main()
   ivec2 texel = pc_origin + ivec2(point % pc_side, point / pc_side);
   vec4 place = texelFetch(position_area_tx, texel, 0);
   vec3 n = texelFetch(normal_kind_tx, texel, 0).xyz;
-  v_point = point + 1;
-  vec3 cell = floor(index_place(pc_index, place.xyz));
+  v_point = vec4(float(point + 1), index_place(pc_index, place.xyz));
+  vec3 cell = floor(v_point.yzw);
   /* Points without light are inside of things, or under them: cells that they share belong to the others. */
   bool sends = any(greaterThan(texelFetch(flux_tx, texel, 0).rgb, vec3(0.0)));
   bool inside = all(greaterThanEqual(cell, vec3(0.0))) && all(lessThan(cell, vec3(float(VPL_INDEX))));

@@ -18,17 +18,15 @@ void main()
     if (any(lessThan(other, ivec3(0))) || any(greaterThanEqual(other, ivec3(VPL_INDEX)))) {
       continue;
     }
-    float point = texelFetch(index_tx, index_texel(other, side) + base, 0).x;
-    if (point == 0.0) {
+    vec4 point = texelFetch(index_tx, index_texel(other, side) + base, 0);
+    if (point.x == 0.0) {
       continue;
     }
-    int index = int(point) - 1;
-    vec3 P = texelFetch(position_area_tx, pc_origin + ivec2(index % pc_side, index / pc_side), 0).xyz;
-    vec3 apart = index_place(pc_index, P) - (vec3(cell) + 0.5);
+    vec3 apart = point.yzw - (vec3(cell) + 0.5);
     float squared = dot(apart, apart);
     if (squared < nearest) {
       nearest = squared;
-      out_point = vec4(point);
+      out_point = point;
     }
   }
 }
