@@ -105,10 +105,7 @@ void main()
     direct += kind == SOURCE_EMISSION || kind == SOURCE_SKY ? chosen : vec3(0.0);
   }
 
-  HistoryTaps taps = HistoryTaps(ivec2(0), vec4(0.0));
-  if (before) {
-    taps = history_taps(old_surface_tx, place, at);
-  }
+  HistoryTaps taps = history_taps(old_surface_tx, before ? place : HISTORY_NOWHERE, at);
   vec4 history = history_mean(taps, history_tx);
   HistoryJoined joined = history_joined(history, history_mean(taps, old_reservoir_tx).w, light, pc_most_history);
   out_reservoir = vec4(intBitsToFloat(r.id), weight, r.seen, joined.moment);
