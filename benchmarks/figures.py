@@ -13,10 +13,10 @@ from rebound.gpu_shaders import TECHNIQUES
 from rebound.scene.data import Scene, View
 from rebound.scene.snapshot import load_snapshot
 
-from .cases import EXAMPLE, Case
+from .cases import BOUNCES, EXAMPLE, Case
 from .curves import Plan, frame_passes
 from .jobs import Job, do
-from .moving import Effort, last_view, measure_ghost, measure_orbit, moved_light, moved_object
+from .moving import Effort, last_view, measure_drag, measure_ghost, measure_orbit, moved_light, moved_object
 from .pictures import INDIRECT, quantity, read_passes
 from .results import CYCLES, EEVEE, Figure, FigureSet, Pass
 from .score import cells
@@ -47,7 +47,7 @@ def measure_figures(case: Case, plan: Plan, folder: Path, quick: bool, say: Say 
 
 
 def measure_moving(case: Case, plan: Plan, kept: Path, quick: bool, say: Say) -> list[FigureSet]:
-    """The orbit with EEVEE beside it, then a light and an object that jump."""
+    """The orbit with EEVEE beside it, then a light and an object that are dragged, and that jump."""
     if case.name not in MOVING_SCENES:
         return []
     size = ORBIT_SIZE_QUICK if quick else ORBIT_SIZE
@@ -55,10 +55,12 @@ def measure_moving(case: Case, plan: Plan, kept: Path, quick: bool, say: Say) ->
     scene, view = load_snapshot(do([Job(str(case.blend), size=size)], kept, say)[0].file)
     camera = np.linalg.inv(last_view(scene, view).view_from_world).tolist()
     samples = ORBIT_TRUTH_SAMPLES_QUICK if quick else ORBIT_TRUTH_SAMPLES
-    truth = do([Job(str(case.blend), CYCLES, samples, size, 1, camera=camera)], kept, say)[0]
+    kinds = ("one_bounce", "multi_bounce")
+    traced = do([Job(str(case.blend), CYCLES, samples, size, BOUNCES[k], camera=camera) for k in kinds], kept, say)
     eevee = _eevee_times(case, size, kept, say)
     sets = []
-    for method in methods():
+    for method in methods(many_bounces=True):
+        truth = traced["MANY" in method.changed.values()]
         say(f"{case.name}: {method.label}, orbit at {size[0]} x {size[1]}")
         device = HeadlessDevice()
         try:
@@ -66,6 +68,7 @@ def measure_moving(case: Case, plan: Plan, kept: Path, quick: bool, say: Say) ->
             figures, _ = measure_orbit(device, method, scene, view, effort, path_traced)
             for i, (name, against) in enumerate(eevee.items()):
                 figures[i] = replace(figures[i], against=against, against_name=name)
+            figures += measure_drag(device, method, scene, view, effort.frames)
             figures += _ghosts(device, method, scene, view, effort)
             title = f"{case.name}, {size[0]} × {size[1]}, {method.label}: a viewport in motion"
             sets.append(FigureSet(title, figures, device.name))

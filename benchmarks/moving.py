@@ -100,30 +100,50 @@ def measure_orbit(
 # --- ghosts ----------------------------------------------------------------------------------------------------------
 
 
-def moved_light(scene: Scene) -> Scene:
-    """The first light a tenth of the scene's size aside; a sun is turned by as much of a radian."""
+def measure_drag(device: HeadlessDevice, method: Method, scene: Scene, view: View, frames: int) -> list[Figure]:
+    """Times of frames while a light or an object is dragged: it moves before each of them."""
+    figures = []
+    for what, moved in (("a light", moved_light), ("an object", moved_object)):
+        states = [moved(scene, SHIFT * n / frames) for n in range(frames + WARM_UP)]
+        studio = Studio(device, method.settings(viewport=True), VIEWPORT)
+
+        def frame(state: Scene, studio: Studio = studio) -> None:
+            studio.show(state)
+            studio.begin(view)
+            studio.sample()
+            studio.display()
+
+        times = [seconds(device, lambda state=state: frame(state)) for state in states if state is not None]
+        studio.free()
+        if times:
+            figures.append(Figure(f"a frame while {what} is dragged, median", statistics.median(times[WARM_UP:]), "s"))
+    return figures
+
+
+def moved_light(scene: Scene, part: float = SHIFT) -> Scene:
+    """The first light ``part`` of the scene's size aside; a sun is turned by as much of a radian."""
     light = scene.lights[0]
-    return replace(scene, lights=(_moved_light(light, SHIFT * _size(scene)), *scene.lights[1:]))
+    return replace(scene, lights=(_moved_light(light, part, _size(scene)), *scene.lights[1:]))
 
 
-def _moved_light(light: Light, distance: float) -> Light:
+def _moved_light(light: Light, part: float, size: float) -> Light:
     matrix = np.array(light.world_from_light)
     if light.kind is LightKind.SUN:
         turn = np.eye(4)
-        turn[:2, :2] = [[np.cos(SHIFT), -np.sin(SHIFT)], [np.sin(SHIFT), np.cos(SHIFT)]]
+        turn[:2, :2] = [[np.cos(part), -np.sin(part)], [np.sin(part), np.cos(part)]]
         matrix = turn @ matrix
     else:
-        matrix[0, 3] += distance
+        matrix[0, 3] += part * size
     return replace(light, world_from_light=matrix)
 
 
-def moved_object(scene: Scene) -> Scene | None:
-    """The largest object that is neither flat nor half as large as the scene, a tenth of its size aside."""
+def moved_object(scene: Scene, part: float = SHIFT) -> Scene | None:
+    """The largest object that is neither flat nor half as large as the scene, ``part`` of its size aside."""
     chosen = _movable(scene)
     if chosen is None:
         return None
     matrix = np.array(chosen.world_from_object)
-    matrix[0, 3] += SHIFT * _size(scene)
+    matrix[0, 3] += part * _size(scene)
     moved = replace(chosen, world_from_object=matrix)
     return replace(scene, instances=tuple(moved if i is chosen else i for i in scene.instances))
 

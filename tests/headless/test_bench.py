@@ -18,6 +18,7 @@ from rebound.benchmarks.gpu_report import GpuRun
 from rebound.benchmarks.moving import (
     SHOWN,
     Effort,
+    measure_drag,
     measure_ghost,
     measure_orbit,
     moved_light,
@@ -125,6 +126,18 @@ def test_orbit_figures_are_of_the_last_view(headless_device):
     assert judged.any() and judged.shape == (24, 40, 3)
     assert 0 < values["a frame of the orbit, median"] < 30
     assert 0 < values[f"relmse after {SHOWN} frames of the orbit"] < 0.5
+
+
+def test_what_is_dragged_moves_before_every_frame(headless_device, monkeypatch):
+    seen = []
+    shown = Studio.show
+    monkeypatch.setattr(Studio, "show", lambda self, s: (seen.append(s), shown(self, s)))
+    light, thing = measure_drag(headless_device, METHOD, room(), VIEW, 3)
+    assert light.value and thing.value and "light" in light.name and "object" in thing.name
+    places = [float(s.lights[0].world_from_light[0, 3]) for s in seen[:5]]
+    assert (np.diff(places) > 0).all() and len({s.lights[0] for s in seen[5:]}) == 1
+    blocks = [next(i for i in s.instances if i.key == "block").world_from_object[0, 3] for s in seen[5:]]
+    assert (np.diff(blocks) > 0).all()
 
 
 def test_ghost_of_a_method_without_memory_is_none(headless_device):
