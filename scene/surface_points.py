@@ -17,6 +17,8 @@ from .data import LUMINANCE, Array, Material, Mesh
 
 # Cells along each side of a face of the cube that directions are sorted by. Odd: the axes lie in the middle of cells.
 _CELLS_A_SIDE = 3
+# Scales along different directions that differ by less than such a part, squared, are one.
+_EVEN = 1e-6
 # At most so many objects are huge: those that have so many times the area of all others.
 _MOST_HUGE, _HUGE = 4, 32.0
 # Points of huge objects that are tried for each that is kept, where those in a box count more.
@@ -123,8 +125,8 @@ class SurfaceSampler:
         Objects that would leave next to nothing to the others (a ground plane) get ``huge_share`` of the points, and
         have half of those in the box ``focus``, (2, 3), if so many can be found there.
         """
-        triangles = self._sorted(parts)
         cofactors = cofactor_matrices(matrices)
+        triangles = self._sorted(parts, cofactors)
         measures = _measures(parts, triangles, cofactors)
         huge = _limit_huge(measures, huge_share) if huge_share < 1.0 and measures else _NO_ROWS
         entries = _entries(measures)
@@ -139,11 +141,18 @@ class SurfaceSampler:
         tried, _ = _draw(parts, triangles, cofactors, only_huge, numbers)
         return _replaced(points, mine, _focused(tried, matrices, focus, len(mine)))
 
-    def _sorted(self, parts: Sequence[Part]) -> list[_Triangles]:
-        wanted = {part.key: part for part in parts}
+    def _sorted(self, parts: Sequence[Part], cofactors: Array) -> list[_Triangles]:
+        even = _are_even(cofactors)
+        keys = []
+        wanted: dict[Hashable, Part] = {}
+        for part in parts:
+            rows = slice(part.first_instance, part.first_instance + part.instance_count)
+            keys.append((part.key, bool(even[rows].all())))
+            wanted[keys[-1]] = part
         kept = {key: known for key, known in self._triangles.items() if key in wanted}
-        self._triangles = kept | {key: _sorted_triangles(part) for key, part in wanted.items() if key not in kept}
-        return [self._triangles[part.key] for part in parts]
+        new = {key: _sorted_triangles(part, even=key[1]) for key, part in wanted.items() if key not in kept}
+        self._triangles = kept | new
+        return [self._triangles[key] for key in keys]
 
 
 def emission_density(material: Material) -> float:
@@ -163,13 +172,30 @@ def gram_matrices(matrices: Array) -> Array:
     return linear.swapaxes(1, 2) @ linear
 
 
-def _sorted_triangles(part: Part) -> _Triangles:
-    """Area, direction and moments of every triangle of a part; a second's work for some ten million of them."""
+def _are_even(cofactors: Array) -> Array:
+    """(n,) whether matrices with these (n, 3, 3) cofactors scale all directions alike."""
+    squares = cofactors.swapaxes(1, 2) @ cofactors
+    size = np.trace(squares, axis1=1, axis2=2)[:, None, None] / 3.0
+    return (np.abs(squares - size * np.eye(3)) <= _EVEN * size).all((1, 2))
+
+
+def _sorted_triangles(part: Part, *, even: bool) -> _Triangles:
+    """Area, direction and moments of every triangle of a part; a second's work for some ten million of them.
+
+    ``even``: it is never scaled unevenly, and directions need not be told apart: one cell, and half of the work.
+    """
     last = part.first_triangle + part.triangle_count
     corners = part.mesh.positions[3 * part.first_triangle : 3 * last].reshape(-1, 3, 3)
     a, b = (np.ascontiguousarray((corners[:, k] - corners[:, 0]).T) for k in (1, 2))
     normal = np.stack([a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))])
     doubled = np.sqrt((normal * normal).sum(0))
+    if even:
+        sums = np.cumsum(doubled, dtype=np.float64) * 0.5
+        total = sums[-1:]
+        moments = [np.full_like(total, (total[0] if i == j else 0.0) / 3.0) for i, j in _PAIRS]
+        found = slice(0, int(total[0] > 0.0))
+        starts = np.concatenate(([0.0], total[found]))
+        return _Triangles(np.arange(len(doubled), dtype=np.int32), sums, starts, np.stack(moments, -1)[found])
     cell = _cells(normal)
     count = 3 * _CELLS_A_SIDE**2
     order = np.argsort(cell, kind="stable").astype(np.int32)

@@ -201,6 +201,19 @@ def test_rotation_changes_no_point():
     np.testing.assert_allclose(first.positions, turned.positions, atol=1e-9)
 
 
+def test_mesh_that_is_stretched_after_all_is_sorted_by_direction():
+    """As long as it is scaled evenly its triangles are one cell, whose share of the points would then be estimated."""
+    mesh, sampler = box("box", (-1, -1, -1), (1, 1, 1)), SurfaceSampler()
+    for name in ("scaled", "stretched", "as_it_is"):
+        matrices = np.array([PLACES[name]])
+        points = sampler.sample(parts_of([mesh]), matrices, 4096)
+        again = SurfaceSampler().sample(parts_of([mesh]), matrices, 4096)
+        np.testing.assert_array_equal(points.positions, again.positions)
+        areas = world_areas(mesh, PLACES[name])
+        counts = np.bincount(triangles_hit(points, mesh), minlength=len(areas))
+        np.testing.assert_allclose(counts / counts.sum(), areas / areas.sum(), atol=0.01)
+
+
 def degenerate():
     line = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.float32)
     return np.concatenate([line, np.zeros((3, 3), np.float32)])
