@@ -105,7 +105,7 @@ class BlenderDevice(Device):
         try:
             texture.handle = gpu.types.GPUTexture(texture.size, **options)
         except (RuntimeError, MemoryError) as error:
-            raise DeviceError(f"No GPU memory for {texture}: {error}") from error
+            raise DeviceError(f"The GPU refuses {texture}: {error}") from error
         if _HAS_SAMPLER_STATE and not is_integer and not texture.info.is_depth:
             texture.handle.filter_mode(False)
             texture.handle.extend_mode("EXTEND")

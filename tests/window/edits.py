@@ -15,12 +15,14 @@ from steps import (
     difference,
     finished,
     module,
+    note_log,
     picture,
     press_f12,
     rendering,
     run,
     samples,
     say,
+    session,
     sessions,
     viewports,
     wait_for,
@@ -34,6 +36,7 @@ def scenario():
     first = picture("first")
     yield from other_engine(first)
     yield from load_file(first)
+    yield from other_versions(first)
     yield from f12_meanwhile()
     yield from compositor()
     yield from view_layers()
@@ -67,6 +70,45 @@ def load_file(first):
     check("and is the same picture", difference(picture("loaded"), first) < SAME)
     yield from wait_for(lambda: len(viewports()) == 1, 5)
     check("the session of the old file is gone", len(viewports()) == 1, len(viewports()), len(sessions()))
+
+
+def other_versions(first):
+    """Files of an older and of a newer Rebound are opened: the one is brought up to date, the other says so once."""
+    versions = module("ui.versions")
+    path, newer = f"{OUT}/version.blend", versions.VERSION + 1
+    for name, held in (
+        ("older", {"version": 0, "vpl_bounces": 0}),
+        ("newer", {"version": newer, "method": 99, "from_the_future": 3.5}),
+    ):
+        bpy.ops.wm.open_mainfile(filepath=f"{OUT}/saved.blend")
+        yield 0.5
+        versions.unregister()  # so that saving numbers nothing
+        for key, value in held.items():
+            versions.stored(bpy.context.scene.rebound)[key] = value
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        versions.register()
+        told = note_log()
+        bpy.ops.wm.open_mainfile(filepath=path)
+        yield 0.5
+        window_context()["space_data"].shading.type = "RENDERED"
+        yield from finished(90)
+        group, shot = bpy.context.scene.rebound, picture(f"file_{name}")
+        if name == "older":
+            bounces = group.vpl_bounces, group.viewport_vpl_bounces
+            check("an older file's setting became two", bounces == ("ONE", "ONE") and not told, *bounces, *told)
+            check("it has a number now", group.version == versions.VERSION, group.version)
+            shown = session()._picture.settings["vpl_bounces"]
+            check("and a picture with one bounce", shown == "ONE" and difference(shot, first) < 0.1, shown)
+        else:
+            check("a newer file says so in the log", any("newer Rebound" in line for line in told), *told)
+            check("each line once", len(told) == len(set(told)))
+            check("its settings are left", group.version == newer and versions.stored(group)["from_the_future"] == 3.5)
+            check("its unknown method is the default's picture", difference(shot, first) < SAME)
+        check("no error in the viewport", not any(s.status.error for s in sessions()))
+    bpy.ops.wm.open_mainfile(filepath=f"{OUT}/saved.blend")
+    yield 0.5
+    window_context()["space_data"].shading.type = "RENDERED"
+    yield from finished(90)
 
 
 def f12_meanwhile():
@@ -149,7 +191,9 @@ def disabled():
     bpy.context.scene.rebound.viewport_samples = 8
     window_context()["space_data"].shading.type = "RENDERED"
     yield from finished(90)
-    check("enabled again, it renders", samples() == 8 and picture("enabled_again").std() > 0.05)
+    counts = [s.status.samples for s in viewports()]
+    shown = float(picture("enabled_again").std())
+    check("enabled again, it renders", counts == [8] and shown > 0.05, counts, len(sessions()), round(shown, 3))
 
 
 run(scenario)

@@ -13,6 +13,7 @@ from steps import (
     finished,
     key,
     middle,
+    module,
     picture,
     point,
     principled,
@@ -110,19 +111,23 @@ def split(whole):
 
 
 def views(whole):
-    """Every view of the default method is another picture, and leaves none of itself behind."""
+    """Every view of both methods is another picture, and leaves none of itself behind."""
     group = bpy.context.scene.rebound
     keys = [item.identifier for item in group.bl_rna.properties["viewport_show"].enum_items]
-    shown = []
-    for name in ("INDIRECT", "ALBEDO", "NORMALS", "VPL_VOXELS", "VPL_MAPS"):
-        if name not in keys:
-            continue
-        group.viewport_show = name
-        yield from finished()
-        shot = picture(f"view_{name.lower()}")
-        shown.append(shot)
-        check(f"the view {name} is no picture", difference(shot, whole) > 0.01)
-    check("there are views", len(shown) >= 3)
+    every = set()
+    for method in ("RSM", "VPL"):
+        group.method, shown = method, {"PICTURE": whole[60:]}
+        names = [name for name in module("settings").views_of(method) if name != "PICTURE"]
+        for name in names if method == "VPL" else [name for name in names if name.startswith(method)]:
+            group.viewport_show = name
+            yield from finished()
+            shot = picture(f"view_{name.lower()}")[60:]
+            error = session().status.error
+            alike = [other for other, before in shown.items() if difference(shot, before) < SAME]
+            check(f"the view {name} is neither the picture nor another view", not alike and not error, *alike, error)
+            shown[name] = shot
+        every |= set(shown)
+    check("every choice was shown", every == set(keys), *sorted(set(keys) - every))
     group.viewport_show = "PICTURE"
     yield from finished()
     check("the picture is back", difference(picture("after_views"), whole) < SAME)
@@ -142,15 +147,18 @@ def statistics(whole):
 
 
 def presets():
-    """Every preset is taken and gives a picture."""
-    panel = bpy.types.REBOUND_PT_presets
-    for path in bpy.utils.preset_paths(panel.preset_subdir):
-        for name in ("Draft", "High"):
-            bpy.ops.script.execute_preset(filepath=f"{path}/{name}.py", menu_idname="REBOUND_PT_presets")
-            bpy.context.scene.rebound.viewport_samples = 4
-            yield from finished(120)
-            check(f"the preset {name} has a picture", picture(f"preset_{name.lower()}").std() > 0.03)
-        break
+    """Every preset is taken, sets what no other does, and gives a picture."""
+    quality, group = module("ui.quality"), bpy.context.scene.rebound
+    taken = {}
+    for name in quality.SHIPPED:
+        bpy.ops.script.execute_preset(filepath=str(quality.shipped_file(name)), menu_idname="REBOUND_PT_presets")
+        values = tuple(getattr(group, kept) for kept in quality.kept_properties())
+        check(f"the preset {name} is another one", values not in taken.values())
+        taken[name] = values
+        group.viewport_samples = 4
+        yield from finished(180)
+        shot, error = picture(f"preset_{name.lower()}"), session().status.error
+        check(f"the preset {name} has a picture", shot.std() > 0.03 and not error, error)
 
 
 run(scenario)

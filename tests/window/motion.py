@@ -30,6 +30,7 @@ def scenario():
     space.region_3d.view_location, space.region_3d.view_distance = (0, 0, 0), 12
     yield from finished(90)
     yield from play(count_draws())
+    yield from properties_that_move()
     yield from sculpt(count_draws())
 
 
@@ -58,6 +59,29 @@ def play(draws):
     yield from finished()
     check("Esc ends it where it began", scene.frame_current == 1 and samples() == 4, scene.frame_current)
     check("with the picture of before", difference(picture("frame_1_again"), first) < SAME)
+
+
+def properties_that_move():
+    """Rebound's own properties: a light's bounce with keys, a viewport's samples with a driver."""
+    scene, light = bpy.context.scene, bpy.data.objects["Light"].data
+    for frame, strength in ((1, 0.0), (11, 8.0)):
+        light.rebound.bounce_strength = strength
+        light.keyframe_insert("rebound.bounce_strength", frame=frame)
+    scene.driver_add("rebound.viewport_samples").driver.expression = "frame + 2"
+    bright = []
+    for frame in (1, 6, 11):
+        scene.frame_set(frame)
+        yield from finished(90)
+        bright.append(float(picture(f"animated_bounce_{frame}").mean()))
+        check(f"frame {frame}: the driver's samples", samples() == frame + 2, samples())
+    rises = bright[1] > bright[0] + 0.002 and bright[2] > bright[1] + 0.002
+    check("an animated bounce is followed", rises, *(round(value, 4) for value in bright))
+    scene.driver_remove("rebound.viewport_samples")
+    scene.rebound.viewport_samples = 4
+    light.animation_data_clear()
+    light.rebound.bounce_strength = 1.0
+    scene.frame_set(1)
+    yield from finished()
 
 
 def sculpt(draws):

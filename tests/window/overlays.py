@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from steps import check, finished, picture, run, select, window_context
+from steps import SAME, check, difference, finished, key, middle, picture, point, run, select, wait_for, window_context
 
 # Colours that nothing else in the window has.
 WIRE = (0.0, 1.0, 0.0)
@@ -107,6 +107,7 @@ def edit_mode():
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_all(action="SELECT")
     yield from finished()
+    yield from x_ray()
     before = picture("edit_mode")
     with bpy.context.temp_override(**window_context()):
         bpy.ops.transform.resize(value=(0.5, 0.5, 0.5))
@@ -116,6 +117,29 @@ def edit_mode():
     with bpy.context.temp_override(**window_context()):
         bpy.ops.object.mode_set(mode="OBJECT")
     yield from finished()
+
+
+def x_ray():
+    """Alt+Z in Edit Mode: Solid mode sees through the cube; a rendered picture is what it was, as in every engine."""
+    shading, region = window_context()["space_data"].shading, window_context()["region"]
+    before = picture("x_ray_off")
+    point(middle(region))
+    yield 0.3
+    for on in (True, False):
+        key("alt+z")
+        yield from wait_for(lambda on=on: shading.show_xray == on, 3)
+        yield from finished()
+        check(f"X-ray {'on' if on else 'off'}", shading.show_xray == on)
+        check("the rendered picture stays", difference(picture(f"x_ray_{on}"), before) < SAME)
+    shading.type = "SOLID"
+    yield 1.0
+    solid = picture("x_ray_solid_off")
+    shading.show_xray = True
+    yield 1.0
+    check("Solid mode sees through", difference(picture("x_ray_solid"), solid) > SAME)
+    shading.show_xray, shading.type = False, "RENDERED"
+    yield from finished(90)
+    check("and the rendered picture is back", difference(picture("x_ray_after"), before) < SAME)
 
 
 run(scenario)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
 import bpy
+import numpy as np
 from steps import (
     check,
     module,
+    principled,
     rendering,
     run,
+    say,
     screenshot,
     select,
     wait_for,
@@ -16,12 +21,21 @@ from steps import (
 
 TABS = ("RENDER", "OUTPUT", "VIEW_LAYER", "SCENE", "WORLD", "OBJECT", "DATA", "MATERIAL")
 PREVIEWS: list[tuple[int, int]] = []
+SECONDS: list[float] = []  # of every preview picture, reading Blender's preview scene included
 
 
 def note_previews() -> None:
-    """Note the size of every preview picture that is rendered."""
-    final_render = module("final_render")
-    view = final_render._view
+    """Note size and time of every preview picture that is rendered."""
+    final_render, engine_module = module("final_render"), module("engine")
+    view, render = final_render._view, engine_module.render_final
+
+    def timed(engine, depsgraph):
+        start = time.perf_counter()
+        render(engine, depsgraph)
+        if engine.is_preview:
+            SECONDS.append(time.perf_counter() - start)
+
+    engine_module.render_final = timed
 
     def noted(engine, depsgraph):
         if engine.is_preview:
@@ -67,7 +81,29 @@ def scenario():
     check("the material's preview is rendered with Rebound", bool(PREVIEWS), PREVIEWS[:3])
     yield 3.0
     screenshot("material_tab")
+    yield from thumbnails()
     yield from f12_errors(window, area)
+
+
+def thumbnails():
+    """The small pictures of materials in lists and in the asset browser, each in the material's colour."""
+    before = len(SECONDS)
+    for name, color in (("Red", (0.8, 0.02, 0.02, 1)), ("Blue", (0.02, 0.02, 0.8, 1))):
+        material, surface = principled(name)
+        surface.inputs["Base Color"].default_value = color
+        start = time.monotonic()
+        with bpy.context.temp_override(id=material):
+            bpy.ops.ed.lib_id_generate_preview()
+        shot = np.zeros((1, 4))
+        while not shot.any() and time.monotonic() < start + 60:
+            yield 0.1
+            shot = np.array(material.preview.image_pixels_float[:]).reshape(-1, 4)
+        red, _green, blue = shot[shot[:, 3] > 0.5][:, :3].mean(axis=0) if shot.any() else (0, 0, 0)
+        well = (red > 1.3 * blue) if name == "Red" else (blue > 1.3 * red)
+        check(f"the thumbnail of {name}", well, len(shot), round(float(red), 3), round(float(blue), 3))
+        say(f"shown after {time.monotonic() - start:.1f} s")
+    check("thumbnails are Rebound's", len(SECONDS) > before)
+    say("seconds of preview pictures:", *(round(seconds, 2) for seconds in SECONDS))
 
 
 def f12_errors(window, area):

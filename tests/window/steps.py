@@ -6,6 +6,7 @@ upper left corner, as the mouse has them; Blender counts from the lower left.
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import sys
@@ -121,6 +122,19 @@ def count_draws() -> list[float]:
 
     viewport.draw = counted
     return draws
+
+
+def note_log() -> list[str]:
+    """A list that from now on gets every warning and error of Rebound's log: as text, for a record holds its frames."""
+    lines: list[str] = []
+
+    class Note(logging.Handler):
+        def emit(self, record):
+            lines.append(f"{record.levelname} {record.getMessage()}")
+            logging.lastResort.handle(record)  # as where nobody listens
+
+    logging.getLogger("rebound").addHandler(Note(logging.WARNING))
+    return lines
 
 
 # --- eyes ------------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+import gpu
 import numpy as np
 from steps import (
     check,
@@ -10,6 +11,7 @@ from steps import (
     difference,
     finished,
     module,
+    note_log,
     picture,
     principled,
     run,
@@ -17,6 +19,7 @@ from steps import (
     say,
     select,
     session,
+    sessions,
     viewports,
     wait_for,
     window_context,
@@ -70,6 +73,7 @@ def scenario():
 
     yield from local_view()
     yield from errors()
+    yield from missing(space)
 
     space.shading.type = "SOLID"
     yield from wait_for(lambda: not viewports(), 3)
@@ -98,23 +102,65 @@ def local_view():
 
 
 def errors():
-    """A fault of ours is shown as text; the next edit tries again."""
+    """A fault of ours is shown as text and logged once, however often it is redrawn; the next edit tries again."""
+    told, tries = note_log(), []
     session_class = module("session").Session
     working = session_class.picture
 
     def broken(*_args):
+        tries.append(1)
         raise ZeroDivisionError("made by the scenario")
 
     session_class.picture = broken
     say("a traceback is expected")
     bpy.data.objects["Cube"].location.x += 0.1
-    yield 2.0
-    lit = picture("own_fault")
-    check("the error stands in the viewport", ((lit[..., 0] > 0.5) & (lit[..., 2] < 0.4)).sum() > 100)
+    yield from wait_for(lambda: bool(tries), 10)
+    yield 1.0
+    lit = text_pixels(picture("own_fault"))
+    check("the error stands in the viewport", lit > 100, lit)
+    for _ in range(5):
+        window_context()["area"].tag_redraw()
+        yield 0.2
+    check("an error is logged once, and not tried again", len(told) == len(tries) == 1, len(tries), *told)
+    say("a traceback is expected")
+    bpy.data.objects["Cube"].location.x += 0.1
+    yield from wait_for(lambda: len(tries) > 1, 5)
+    check("the next edit tries again", len(tries) == 2, len(tries))
     session_class.picture = working
-    bpy.data.objects["Cube"].location.x -= 0.1
+    bpy.data.objects["Cube"].location.x -= 0.2
     yield from finished()
-    check("the next edit recovers", samples() == 12)
+    check("and with the fault gone it recovers", samples() == 12)
+
+
+def text_pixels(shot: np.ndarray) -> int:
+    """Pixels in the orange of errors, as the view transform shows it; nothing else in the viewport has it."""
+    red, green, blue = shot[60:, :, 0], shot[60:, :, 1], shot[60:, :, 2]
+    return int(((red > 0.7) & (green > 0.4) & (green < 0.75) & (blue < 0.55)).sum())
+
+
+def missing(space):
+    """What a GPU lacks is named in the viewport, without a traceback."""
+    texture = gpu.types.GPUTexture
+
+    def refused(size, **options):
+        if options.get("format") == "RG16F":
+            raise RuntimeError("unknown format")
+        return texture(size, **options)
+
+    space.shading.type = "SOLID"
+    yield from wait_for(lambda: not viewports(), 5)
+    gpu.types.GPUTexture = refused
+    space.shading.type = "RENDERED"
+    yield from wait_for(lambda: any(s.status.error for s in sessions()), 20)
+    yield 1.0
+    errors = [s.status.error for s in sessions() if s.status.error]
+    lit = text_pixels(picture("missing_format"))
+    gpu.types.GPUTexture = texture
+    check("a missing format of textures is named", len(errors) == 1 and "RG16F" in errors[0], *errors)
+    check("as text in the viewport", lit > 100, lit)
+    bpy.data.objects["Cube"].location.x += 0.01
+    yield from finished(90)
+    check("where it is there, the next edit renders", samples() == 12)
 
 
 run(scenario)
