@@ -129,7 +129,7 @@ BAKE_SETTINGS = (
         "FLOAT",
         "Kept Energy",
         "Wavelets: which part of each vertex' transfer is kept. Higher is truer at the cost of memory; lower leaves "
-        "the smallest terms out",
+        "the smallest terms out. Of a lobe ten times as much is left out",
         0.999,
         minimum=0.5,
         maximum=1.0,

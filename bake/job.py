@@ -58,7 +58,7 @@ class BakeSettings:
     )
     error: float = 0.01  # GLOSSY, WAVELET_GLOSSY's bounces: root mean square error of the compression, of the length
     texels: int = 32  # WAVELET...: a power of two, up to 64; along a side of a face of the light's cube map
-    keep: float = 0.999  # WAVELET...: the part of each row's energy that is kept
+    keep: float = 0.999  # WAVELET...: the part of each row's energy that is kept; a lobe's leave ten times as much out
     points: int = 0  # at most so many inside an object's triangles, where its vertices do not tell what is between them
     detail: float = (
         0.05  # with points: which error between the vertices is left, in parts of what an open place receives

@@ -20,6 +20,15 @@ from .sphere import Array, cube_directions, cube_solid_angles, spread
 from .surfaces import Surfaces
 from .transfer import Blocked, Progress, Sampling, pieces, reflected, trace
 
+# Rows of a lobe leave out so many times the energy that others do: they are a third of the size for it, and what their
+# few products leave out of the lobe is more.
+_LOBE_LEAVES = 10.0
+
+
+def lobe_keep(keep: float) -> float:
+    """The part of a lobe's rows that is kept where ``keep`` of the others is."""
+    return max(1.0 - _LOBE_LEAVES * (1.0 - keep), min(keep, 0.5))
+
 
 def texel_shares(normals: Array, directions: Array, size: int) -> Array:
     """(V, 6 size²): the part of a white sky's light that each texel gives each vertex; unblocked ones add up to 1.
@@ -43,8 +52,8 @@ def wavelet(
     """Rows of the vertices ``rows`` for a light of 6 x size² texels along the axes ``frame`` (3, 3); with a ``lobe``
     its K rows of each vertex, one vertex after another.
 
-    ``keep``: the fraction (0..1) of the squared sum of each row, or of all K of a lobe, that its terms keep. Closing
-    the generator ends the bake.
+    ``keep``: the fraction (0..1) of the squared sum of each row that its terms keep; ``lobe_keep`` of it of all K of a
+    lobe. Closing the generator ends the bake.
     """
     directions = cube_directions(size).reshape(-1, 3) @ frame.T
     angles = cube_solid_angles(size).reshape(-1)
@@ -63,7 +72,7 @@ def wavelet(
             values = np.zeros((len(piece), len(lobe.orders), len(directions)), np.float32)
             values[at, :, seen] = lobe_factors(surfaces.normals[piece], lobe, at, directions[seen]) * angles[seen, None]
             coefficients = _transformed(values, size).reshape(-1, len(directions))
-            mirrored.append(haar.sparse_rows(coefficients, keep, len(lobe.orders)))
+            mirrored.append(haar.sparse_rows(coefficients, lobe_keep(keep), len(lobe.orders)))
     return haar.join_rows(found), haar.join_rows(mirrored) if mirrored else None
 
 

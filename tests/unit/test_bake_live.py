@@ -147,6 +147,17 @@ def test_bounces_of_glossy_wavelets_are_seen_in_the_lobe():
     assert white.max() < 1.05 and mirrored_white.max() < 1.1
 
 
+def test_lobe_leaves_out_ten_times_the_energy():
+    """Rows of the matt side keep 0.999, those of the lobe together 0.99."""
+    found = {}
+    for keep in (1.0, 0.999):
+        made = BakeSettings(kind=Kind.WAVELET_GLOSSY, texels=16, keep=keep, bounces=0, rays="numpy", lobe_terms=8)
+        bake = finish(bake_objects(metal_scene(), ["ball"], made))["ball"]
+        found[keep] = [(wavelet_rows(bake, prefix).dense() ** 2).sum() for prefix in ("", "lobe_")]
+    kept = np.divide(found[0.999], found[1.0])
+    assert 0.999 <= kept[0] < 0.9999 and 0.99 <= kept[1] < 0.993, kept
+
+
 def test_bake_is_unfit_for_another_roughness():
     shown = metal_scene()
     made = BakeSettings(kind=Kind.WAVELET_GLOSSY, texels=4, bounces=0, directions=16, lobe_terms=4, rays="numpy")
