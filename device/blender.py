@@ -16,6 +16,7 @@ import numpy as np
 from . import binding, blender_convert
 from .blender_log import PROBE, failed_stage, probed_line, run_captured, trace
 from .interface import Device, DeviceError, DrawState, Program, Target, Texture, Vertices, Viewport
+from .resources import paired_corners
 from .shader import Shader, ShaderError, Source
 
 _logger = logging.getLogger("rebound")  # by name: as an extension the package is bl_ext.….rebound
@@ -57,6 +58,7 @@ class BlenderDevice(Device):
         self.name = f"{ {'OPENGL': 'OpenGL', 'VULKAN': 'Vulkan', 'METAL': 'Metal'}.get(backend, backend) } {renderer}"
         # Blender wants a vertex buffer even where a shader has no attributes.
         self._attributeless: Any = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=3)])
+        self._paired: tuple[int, Any] | None = None  # corners, and the batch of so many
         self._pixel: Texture | None = None
         self._bound: Any = None
         self._context = 0
@@ -71,7 +73,7 @@ class BlenderDevice(Device):
 
     def close(self) -> None:
         """Drop the device's own buffers. Programs stay: they are Blender's for as long as the extension is enabled."""
-        self._attributeless = None
+        self._attributeless = self._paired = None
         self.free(self._pixel)
         self._pixel = None
 
@@ -90,7 +92,7 @@ class BlenderDevice(Device):
         try:
             self._begin(program, None, DrawState(), None)
             program.set(resources)
-            self._draw(program, None, 3, 1)
+            self._draw(program, None, 3, 1, paired=False)
         finally:
             self._end(program, None)
 
@@ -221,7 +223,10 @@ class BlenderDevice(Device):
         if self._backend == "OPENGL" and binding.touches_images(program.shader):
             self._barrier()
 
-    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int) -> None:
+    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int, paired: bool) -> None:
+        if paired:
+            self._paired_batch(count).draw_range(program.handle, elem_start=0, elem_count=count)
+            return
         batch = self._attributeless if vertices is None else vertices.cache.get(None)
         if batch is None:
             raise ValueError(f"Shader {program.shader.name}: the vertices were freed")
@@ -233,6 +238,14 @@ class BlenderDevice(Device):
         if vertices is None:
             batch = _batch([gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=count)])
         batch.draw_instanced(program.handle, instance_start=0, instance_count=instances)
+
+    def _paired_batch(self, count: int) -> Any:
+        if self._paired is None or self._paired[0] < count:
+            corners = paired_corners(count)
+            nothing = gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), len=corners.size)
+            indices = gpu.types.GPUIndexBuf(type="TRIS", seq=corners)
+            self._paired = corners.size, gpu.types.GPUBatch(type="TRIS", buf=nothing, elem=indices)
+        return self._paired[1]
 
     def _dispatch(self, program: Program, groups: tuple[int, int, int], resources: Mapping[str, Any]) -> None:
         if self._cleared and self.is_software:

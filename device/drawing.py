@@ -86,11 +86,18 @@ class Drawing:
         self._device._end(self._program, self._target)
 
     def __call__(
-        self, vertices: Vertices | None = None, count: int | None = None, instances: int = 1, **resources: Any
+        self,
+        vertices: Vertices | None = None,
+        count: int | None = None,
+        instances: int = 1,
+        *,
+        paired: bool = False,
+        **resources: Any,
     ) -> None:
         """Draw all of ``vertices`` ``instances`` times; gl_InstanceID counts from 0.
 
-        None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone.
+        None: no attributes, ``count`` corners (3 unless given) known by gl_VertexID alone. ``paired``, of one instance:
+        of six corners the fourth is the first and the fifth is the third, so that nobody need be asked for them.
         """
         program = self._program
         if resources.keys() != self._rest:
@@ -108,8 +115,10 @@ class Drawing:
             count = vertices.count
         if count % 3:
             raise ValueError(f"Shader {program.shader.name}: {count} corners are not whole triangles")
+        if paired and (vertices is not None or instances != 1):
+            raise ValueError(f"Shader {program.shader.name}: paired triangles are for one instance without vertices")
         if count and instances:
-            self._device._draw(program, vertices, count, instances)
+            self._device._draw(program, vertices, count, instances, paired)
 
 
 def _check_inputs(shader: Shader, vertices: Vertices) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import binding
 from .interface import Device, DeviceError, DrawState, Program, Target, Texture, Vertices, Viewport
+from .resources import paired_corners
 from .shader import Shader, ShaderError
 
 _DTYPES = {"RGBA16F": "f2", "RG16F": "f2", "R16F": "f2", "R32UI": "u4", "R32I": "i4"}
@@ -48,6 +49,8 @@ class HeadlessDevice(Device):
         self.max_texture_size = min(16384, ctx.info["GL_MAX_TEXTURE_SIZE"])
         self._programs: dict[Shader, Program] = {}
         self._attributeless: dict[Program, Any] = {}
+        self._paired: Any = None  # numbers of corners
+        self._paired_arrays: dict[Program, Any] = {}
         # Bound between draws: a framebuffer that is freed while it is bound makes every later one an OpenGL error.
         self._idle = ctx.framebuffer([ctx.renderbuffer((1, 1))])
 
@@ -62,6 +65,8 @@ class HeadlessDevice(Device):
     def close(self) -> None:
         self._programs.clear()
         self._attributeless.clear()
+        self._paired_arrays.clear()
+        self._paired = None
         self._ctx.release()
 
     # --- resources ---------------------------------------------------------------------------------------------------
@@ -172,12 +177,23 @@ class HeadlessDevice(Device):
         if binding.touches_images(program.shader):
             self._ctx.memory_barrier()
 
-    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int) -> None:
+    def _draw(self, program: Program, vertices: Vertices | None, count: int, instances: int, paired: bool) -> None:
+        if paired:
+            self._paired_array(program, count).render(moderngl.TRIANGLES, vertices=count)
+            return
         cache = self._attributeless if vertices is None else vertices.cache
         vertex_array = cache.get(program)
         if vertex_array is None:
             vertex_array = cache[program] = self._vertex_array(program, vertices)
         vertex_array.render(moderngl.TRIANGLES, vertices=count, instances=instances)
+
+    def _paired_array(self, program: Program, count: int) -> Any:
+        if self._paired is None or self._paired.size < 4 * count:
+            self._paired = self._ctx.buffer(paired_corners(count).tobytes())
+            self._paired_arrays.clear()
+        if program not in self._paired_arrays:
+            self._paired_arrays[program] = self._ctx.vertex_array(program.handle, [], index_buffer=self._paired)
+        return self._paired_arrays[program]
 
     def _vertex_array(self, program: Program, vertices: Vertices | None) -> Any:
         content = []

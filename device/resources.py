@@ -72,6 +72,15 @@ class Vertices:
         self.bytes = count * sum(4 * components for _, components in layout.values())
 
 
+def paired_corners(count: int) -> np.ndarray:
+    """(triangles, 3) uint32 numbers of the corners to draw of pairs of triangles: at least ``count``, a power of two's
+    pairs. The second triangle of each pair begins with the first's first and third corner.
+    """
+    pairs = 1 << max(-(-count // 6) - 1, 0).bit_length()
+    first = 6 * np.arange(pairs, dtype=np.uint32)[:, None]
+    return (first + np.array([0, 1, 2, 0, 2, 5], np.uint32)).reshape(-1, 3)
+
+
 @dataclass(frozen=True)
 class DrawState:
     """Fixed-function state of a draw. ``depth_write`` needs a depth test; use "ALWAYS" to write without testing.

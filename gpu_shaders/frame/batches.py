@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ...gpu_scene import Draw, GpuScene
 
 MOST_ROWS = 1 << 16  # 1 MiB, and a million triangles or so
+# Fewer chunks of pairs are not worth a call of their own.
+LEAST_PAIRED = 64
 # Chunks of all lists that are kept, 64 MiB: of every light map that is drawn anew again and again.
 MOST_KEPT = 1 << 22
 
@@ -38,6 +40,7 @@ class Batch:
     first_chunk: int
     chunk_count: int
     instances: int
+    paired: bool = False  # all are pairs of triangles that share two corners, of which the vertex shader is asked once
 
     @property
     def triangles(self) -> int:
@@ -51,6 +54,7 @@ class Batches:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._rows = np.zeros((0, 4), np.float32)  # chunks of all draws, one draw after the other
+        self._paired = np.zeros(0, bool)  # of each, whether its triangles are pairs
         self._starts = np.zeros(1, np.int64)
         self._instances: Sequence[int] = ()  # instances of each draw's call
         self._kept: OrderedDict[Hashable, tuple[tuple[Batch, ...], Texture | None]] = OrderedDict()
@@ -76,6 +80,11 @@ class Batches:
         self._rows[:, 1] = np.minimum(CHUNK_TRIANGLES, triangles[of] - CHUNK_TRIANGLES * chunk)
         self._rows[:, 2] = instance[of] + copy
         self._rows[:, 3] = material[of]
+        self._paired = np.zeros(len(of), bool)
+        for page in {draw.page for draw in draws}:
+            mine = np.flatnonzero(np.array([draw.page is page for draw in draws], bool)[of])
+            starts, counts = self._rows[mine, :2].astype(np.int64).T
+            self._paired[mine] = page.is_paired(starts, counts)
 
     def of(self, gpu_scene: GpuScene, shader: Shader, draws: Sequence[Draw], passes: Passes) -> tuple[Batch, ...]:
         """The calls that draw ``draws`` with a pass. ``passes``: what light goes through, by the material's index."""
@@ -115,21 +124,32 @@ class Batches:
             groups[programs[material], draw.page, alone].append(draw)
         if not groups:
             return (), None
-        rows = [self._rows[self._starts[d.number] : self._starts[d.number + 1]] for g in groups.values() for d in g]
-        table = replace_texels(self.device, np.concatenate(rows), None)
+        runs = [(members, *self._run(members)) for members in groups.values()]
+        table = replace_texels(self.device, np.concatenate([self._rows[chunks] for _, chunks, _ in runs]), None)
         found, first = [], 0
-        for members in groups.values():
+        for members, chunks, paired_count in runs:
             draw = members[0]
-            count = sum(int(self._starts[d.number + 1] - self._starts[d.number]) for d in members)
             given: dict[str, Any] = {"chunk_tx": table, "corner_tx": draw.page.corners}
             if asks:
                 given |= gpu_scene.image_inputs(draw.material)
                 given |= gpu_scene.attribute_inputs(draw.material, draw.page)
-            instances = self._instances[draw.number]
-            found.append(Batch(programs[draw.material][0], given, first, count, instances))
-            first += count
+            program, instances = programs[draw.material][0], self._instances[draw.number]
+            for count, paired in ((paired_count, True), (len(chunks) - paired_count, False)):
+                if count:
+                    found.append(Batch(program, given, first, count, instances, paired))
+                first += count
         order = {program: number for number, (program, _) in enumerate(programs.values())}
         return tuple(sorted(found, key=lambda batch: order[batch.program])), table
+
+    def _run(self, members: Sequence[Draw]) -> tuple[np.ndarray, int]:
+        """The chunks of draws that go into one call, those that are pairs first; and how many that are, if it pays."""
+        starts = [(int(self._starts[draw.number]), int(self._starts[draw.number + 1])) for draw in members]
+        chunks = np.concatenate([np.arange(start, end) for start, end in starts])
+        paired = self._paired[chunks]
+        count = int(np.count_nonzero(paired))
+        if self._instances[members[0].number] > 1 or count < LEAST_PAIRED:
+            return chunks, 0
+        return chunks[np.argsort(~paired, kind="stable")], count
 
     def _drop_oldest(self) -> None:
         texels = sum(table.size[0] * table.size[1] for _, table in self._kept.values() if table is not None)

@@ -69,6 +69,7 @@ def draw_batches(
                     None,
                     count=CHUNK_CORNERS * batch.chunk_count,
                     instances=batch.instances,
+                    paired=batch.paired,
                     pc_first_chunk=batch.first_chunk,
                     **batch.given,
                 )

@@ -38,10 +38,16 @@ class Page:
     attributes: Mapping[Attribute, Texture]
     triangles: int
     first: dict[MeshKey, int]  # first triangle of each of its meshes
+    single: np.ndarray  # (triangles + 2,) int32: of every second one up to here, how many begin no pair
 
     @property
     def textures(self) -> tuple[Texture, ...]:
         return (self.corners, *self.attributes.values())
+
+    def is_paired(self, starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
+        """(n,) whether runs of ``counts`` triangles from ``starts`` are pairs, but for the last of an odd number."""
+        last = starts + counts // 2 * 2
+        return self.single[last] == self.single[starts]
 
 
 class MeshPages:
@@ -126,20 +132,40 @@ class MeshPages:
         _concatenate([mesh.positions for mesh in meshes], flat[:end, :3])
         for mesh, start in zip(meshes, starts, strict=False):
             pack_normals(mesh.normals, flat[3 * start : 3 * start + len(mesh.normals), 3])
-        textures = {}
+        textures, kept = {}, []
         for attribute in attributes:
             channels, format = (2, "RG32F") if attribute.field == "uv" else (4, "RGBA32F")
             values = _rows(height, channels)
             arrays = [mesh.corner_attribute(attribute.field, attribute.name) for mesh in meshes]
             _concatenate(arrays, values.reshape(-1, channels)[:end])
             textures[attribute] = self.device.texture((PAGE_WIDTH, height), format, values)
+            kept.append(values)
         texture = self.device.texture((PAGE_WIDTH, height), "RGBA32F", corners)
-        page = Page(texture, textures, starts[-1], dict(zip(keys, starts, strict=False)))
+        single = _single(flat[:end], *(values.reshape(-1, values.shape[2])[:end] for values in kept))
+        page = Page(texture, textures, starts[-1], dict(zip(keys, starts, strict=False)), single)
         self._page_of |= dict.fromkeys(keys, page)
 
     def _free(self, page: Page) -> None:
         for texture in page.textures:
             self.device.free(texture)
+
+
+def _single(*layers: np.ndarray) -> np.ndarray:
+    """``Page.single`` of corners' layers, each (3n, 2 or 4) float32.
+
+    A pair is what Blender makes of a quadrilateral: corners a b c, a c d. They are the same if their bits are.
+    """
+    count = len(layers[0]) // 3
+    paired = np.ones(max(count - 1, 0), bool)
+    for layer in layers:
+        for column in layer.view(np.int64).reshape(count, 3, -1).transpose(2, 1, 0):
+            paired &= (column[0, 1:] == column[0, :-1]) & (column[1, 1:] == column[2, :-1])
+    single = np.zeros(count + 2, np.int32)
+    begins_none = np.ones(count, np.int32)
+    begins_none[:-1] = ~paired
+    for parity in (0, 1):
+        single[2 + parity :: 2] = np.cumsum(begins_none[parity::2])
+    return single
 
 
 def pack_normals(normals: np.ndarray, out: np.ndarray) -> None:

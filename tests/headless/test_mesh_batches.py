@@ -72,6 +72,28 @@ def calls(studio, monkeypatch, shown, **settings):
     return drawn.count("frame_gbuffer"), found
 
 
+def test_quadrilaterals_share_corners_and_look_the_same(studio, monkeypatch):
+    """Round balls are quadrilaterals but for their poles; the sides of the others are not flat, and no pairs."""
+    shown = field([sphere(f"ball {k}", radius=0.8, rings=15 + k, smooth=k < 2) for k in range(3)])
+    pairs = []
+    original = studio.device._draw
+
+    def counted(program, vertices, count, instances, paired):
+        pairs.append((program.shader.name, paired, count))
+        original(program, vertices, count, instances, paired)
+
+    monkeypatch.setattr(studio.device, "_draw", counted)
+    found = studio.render(shown, VIEW, 1, PASSES)
+    corners = {paired: sum(n for name, p, n in pairs if name == "frame_gbuffer" and p == paired) for paired in (0, 1)}
+    assert corners[1] > corners[0] > 0
+    monkeypatch.setattr(batches, "LEAST_PAIRED", 1 << 30)
+    pairs.clear()
+    other = Studio(studio.device)
+    assert_same(found, other.render(shown, VIEW, 1, PASSES))
+    assert not any(paired for _, paired, _ in pairs)
+    other.free()
+
+
 def assert_same(a, b):
     for name in PASSES:
         np.testing.assert_array_equal(a[name], b[name], name)
@@ -193,7 +215,7 @@ def test_passes_over_the_g_buffer_have_its_depths_to_the_bit(studio):
     }  # fmt: skip
     packed = PRT_DRAW.pack([block], for_uniform=True)
     state = DrawState(depth_test="EQUAL")
-    device.draw(DRAW[Look.MATT], vertices, over, state=state, light_tx=light_texture, prt_draw=packed)
+    device.draw(DRAW[Look.MATT, False], vertices, over, state=state, light_tx=light_texture, prt_draw=packed)
     is_ball = device.read(surfaces.colors[2])[..., 2] > -1.9
     is_ball &= device.read(surfaces.colors[0])[..., 3] > 0.0
     is_hit = device.read(over.colors[1])[..., 0] > 0.0

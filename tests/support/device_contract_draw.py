@@ -286,6 +286,30 @@ def test_drawing_equals_draw(device):
     assert pictures[0].any()
 
 
+def test_paired_triangles_are_drawn_without_asking_for_shared_corners(device):
+    """Corners 3 and 4 of six lie elsewhere here: whoever asked for them would show it."""
+    shader = Shader(
+        "paired", vertex="v", fragment="f", outputs={"out_color": "VEC4"},
+        files={
+            "v": """void main() {
+                      int square = gl_VertexID / 6;
+                      int corner = gl_VertexID - 6 * square;
+                      vec2 p = vec2(corner == 1 || corner == 2, corner == 2 || corner == 5);
+                      p += corner == 3 || corner == 4 ? vec2(9.0) : vec2(square & 3, square >> 2);
+                      gl_Position = vec4(0.5 * p - 1.0, 0.0, 1.0); }""",
+            "f": "void main() { out_color = vec4(1.0); }",
+        },
+    )  # fmt: skip
+    for squares in (1, 5, 16):  # ever more corners than before
+        target = canvas(device, (8, 8))
+        with device.drawing(shader, target) as draw:
+            draw(count=6 * squares, paired=True)
+        covered = device.read(target.colors[0])[..., 0] > 0
+        assert covered.sum() == covered.size * squares // 16
+        with pytest.raises(ValueError, match="paired"), device.drawing(shader, target) as draw:
+            draw(count=6, instances=2, paired=True)
+
+
 def test_drawing_switches_textures_from_draw_to_draw(device):
     shader = Shader(
         "textured", vertex="v", fragment="f", inputs={"in_position": "VEC3"}, outputs={"out_color": "VEC4"},
