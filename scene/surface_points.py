@@ -73,6 +73,7 @@ class Points:
         return len(self.weights)
 
 
+_SortedKey = tuple[Hashable, bool]  # Part.key, and whether all of its instances are scaled evenly
 _NO_ROWS, _NO_VECTORS = np.zeros(0, np.int64), np.zeros((0, 3))
 _NO_POINTS = Points(
     _NO_ROWS, _NO_ROWS, _NO_VECTORS, _NO_VECTORS, _NO_VECTORS, np.zeros(0), np.zeros((0, 0, 4)), weights=np.zeros(0)
@@ -109,7 +110,7 @@ class SurfaceSampler:
     """Draws points; keeps what it found out about each mesh for as long as that is asked for."""
 
     def __init__(self) -> None:
-        self._triangles: dict[Hashable, _Triangles] = {}
+        self._triangles: dict[_SortedKey, _Triangles] = {}
 
     def sample(
         self,
@@ -143,8 +144,8 @@ class SurfaceSampler:
 
     def _sorted(self, parts: Sequence[Part], cofactors: Array) -> list[_Triangles]:
         even = _are_even(cofactors)
-        keys = []
-        wanted: dict[Hashable, Part] = {}
+        keys: list[_SortedKey] = []
+        wanted: dict[_SortedKey, Part] = {}
         for part in parts:
             rows = slice(part.first_instance, part.first_instance + part.instance_count)
             keys.append((part.key, bool(even[rows].all())))
