@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Callable, Generator, Hashable, Sequence
+from collections.abc import Callable, Generator, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from typing import Any
@@ -15,13 +15,14 @@ from ..scene.data import Array, Instance, Mesh, Scene, Visibility
 from . import sh
 from .compress import Compressed, compress
 from .file import Bake
-from .glossy import glossy, turn_matrices, what_is_seen
+from .glossy import glossy, what_is_seen
 from .haar import SparseRows
+from .matrices import turn_matrices
 from .occlusion import Caster, make_caster
 from .refine import Detail, refine, with_details
 from .separable import LOBES, factor, tangents
-from .surfaces import Surfaces, frame_of, gather, mesh_fingerprint
-from .transfer import Progress, Sampling, diffuse, scaled
+from .surfaces import Surfaces, frame_of, gather, is_mirror, mesh_fingerprint
+from .transfer import Lit, Progress, Sampling, diffuse, passed_on, scaled
 from .wavelets import mirrored_bounces, wavelet
 
 _logger = logging.getLogger("rebound")  # by name: as an extension the package is bl_ext.….rebound
@@ -90,11 +91,14 @@ class BakeSettings:
             raise ValueError(f"bands and result_bands together are more than {sh.MAX_BANDS + 1}")
 
 
-def surroundings_fingerprint(scene: Scene, key: Hashable, shape_of: Callable[[Mesh], str] = mesh_fingerprint) -> str:
+def surroundings_fingerprint(
+    scene: Scene, key: Hashable, shape_of: Callable[[Mesh], str] = mesh_fingerprint, lobes: bool = False
+) -> str:
     """Hexadecimal SHA-256 of all that a bake of ``key`` depends on beside its own mesh: who stands where, how coloured.
 
     Seen from the object: moving it and all others together rigidly changes nothing to speak of (5 digits are kept).
-    ``shape_of``: mesh_fingerprint, or the like of it that remembers.
+    ``shape_of``: mesh_fingerprint, or the like of it that remembers. ``lobes``: how rough the others are that light
+    keeps its direction at, too; the object's own roughness may be changed after its bake.
     """
     others = [i for i in scene.instances if i.key == key or i.visibility & Visibility.SHADOW]
     own = next(i for i in others if i.key == key)
@@ -106,10 +110,12 @@ def surroundings_fingerprint(scene: Scene, key: Hashable, shape_of: Callable[[Me
     for other, place in zip(others, places.tolist(), strict=True):
         colours = [scene.materials[m] for m in other.materials]
         look = [(c.base_color, str(c.base_color_texture), c.metallic, c.specular, c.layered) for c in colours]
+        rough = [round(c.roughness, 2) for c in colours if is_mirror(c)] if lobes and other.key != key else []
         flags = int(other.visibility & (Visibility.SHADOW | Visibility.BOUNCE))
         if other.mesh not in shapes:  # one mesh may stand in 50,000 places
             shapes[other.mesh] = shape_of(scene.meshes[other.mesh])
-        lines.append(f"{shapes[other.mesh]} {other.key == key} {place} {look} {flags}")
+        line = f"{shapes[other.mesh]} {other.key == key} {place} {look} {flags}"
+        lines.append(f"{line} {rough}" if rough else line)
     return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
 
 
@@ -120,11 +126,18 @@ def unfit(about: Any, scene: Scene, key: Hashable, shape_of: Callable[[Mesh], st
         return "the object is no longer there"
     if about.get("fingerprint") != shape_of(scene.meshes[instance.mesh]):
         return "the mesh has changed since it was baked: bake again"
-    if about.get("surroundings") != surroundings_fingerprint(scene, key, shape_of):
-        return "what stands around the object, or a colour, has changed since it was baked: bake again"
+    bounced, lobes = _has_bounces(about.get("settings", {})), bool(about.get("lobes"))
+    if bounced and not lobes and any(is_mirror(scene.materials[m]) for i in scene.instances for m in i.materials):
+        return "it was baked by an older Rebound, in which metals passed light on to all sides alike: bake again"
+    if about.get("surroundings") != surroundings_fingerprint(scene, key, shape_of, lobes):
+        return "what stands around the object, or how it looks, has changed since it was baked: bake again"
     if "roughness" in about and abs(about["roughness"] - roughness_of(scene, instance)[0]) > _SAME_ROUGHNESS:
         return f"its roughness is no longer {about['roughness']:.2f}, for which it was baked: bake again"
     return ""
+
+
+def _has_bounces(settings: Mapping[str, Any]) -> bool:
+    return bool(settings.get("bounces") and settings.get("shadows"))
 
 
 def roughness_of(scene: Scene, instance: Instance) -> tuple[float, float]:
@@ -180,8 +193,9 @@ Found = dict[Hashable, tuple[dict[str, Any], dict[str, Array]]]
 def _about(scene: Scene, key: Hashable, settings: BakeSettings) -> dict[str, Any]:
     plain = asdict(settings) | {"kind": settings.kind.value}
     mesh = scene.meshes[next(i for i in scene.instances if i.key == key).mesh]
-    about = {"kind": plain["kind"], "object": str(key), "fingerprint": mesh_fingerprint(mesh)}
-    return about | {"surroundings": surroundings_fingerprint(scene, key), "settings": plain}
+    lobes = _has_bounces(plain)
+    about = {"kind": plain["kind"], "object": str(key), "fingerprint": mesh_fingerprint(mesh), "lobes": lobes}
+    return about | {"surroundings": surroundings_fingerprint(scene, key, lobes=lobes), "settings": plain}
 
 
 def _sampling(settings: BakeSettings) -> Sampling:
@@ -223,24 +237,30 @@ def _one_by_one(
     scene: Scene, surfaces: Surfaces, caster: Caster, instances: Sequence[Instance], settings: BakeSettings
 ) -> Generator[Progress, None, Found]:
     """Glossy matrices or wavelet rows of each; what they have in common, light that bounced, is found once before."""
-    sampling, bounced, start = _sampling(settings), None, 0.0
+    sampling, start = _sampling(settings), 0.0
+    bounced: Array | None = None  # WAVELET: with all bounces
+    seen: Lit | None = None  # the others: a bounce less, for their own rays
     if settings.bounces and settings.shadows:
-        wanted = sampling if settings.kind is Kind.WAVELET else what_is_seen(sampling)
-        bounced, start = (yield from scaled(diffuse(surfaces, caster, wanted), 0.0, 0.4)), 0.4
+        if settings.kind is Kind.WAVELET:
+            bounced = yield from scaled(diffuse(surfaces, caster, sampling), 0.0, 0.4)
+        else:
+            seen = yield from scaled(passed_on(surfaces, caster, what_is_seen(sampling)), 0.0, 0.4)
+        start = 0.4
     found: Found = {}
     for number, instance in enumerate(instances):
         if settings.kind is Kind.WAVELET_GLOSSY:
-            work = _wavelet_glossy(scene, surfaces, caster, instance, settings, bounced)
+            work = _wavelet_glossy(scene, surfaces, caster, instance, settings, seen)
+        elif settings.kind is Kind.GLOSSY:
+            work = _glossy(surfaces, caster, instance, settings, seen)
         else:
-            of_one = _glossy if settings.kind is Kind.GLOSSY else _wavelet
-            work = of_one(surfaces, caster, instance, settings, bounced)
+            work = _wavelet(surfaces, caster, instance, settings, bounced)
         part = (1.0 - start) / len(instances)
         found[instance.key] = yield from scaled(work, start + number * part, part)
     return found
 
 
 def _glossy(
-    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
+    surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Lit | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
     rows = surfaces.rows(instance.key)
     bake = glossy(surfaces, caster, _sampling(settings), settings.result_bands, rows, seen)
@@ -273,7 +293,7 @@ def _wavelet(
 
 
 def _wavelet_glossy(
-    scene: Scene, surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Array | None
+    scene: Scene, surfaces: Surfaces, caster: Caster, instance: Instance, settings: BakeSettings, seen: Lit | None
 ) -> Generator[Progress, None, tuple[dict[str, Any], dict[str, Array]]]:
     frame, rows = frame_of(instance.world_from_object), surfaces.rows(instance.key)
     roughness, apart = roughness_of(scene, instance)
@@ -291,7 +311,7 @@ def _wavelet_glossy(
     arrays = _sparse_arrays("", sparse) | _sparse_arrays("lobe_", mirrored)
     arrays["turns"] = (np.stack([normals, tangents(normals)], axis=1) @ frame).astype(np.float32)
     more: dict[str, Any] = {"width": sparse.width, "roughness": roughness, "lobe_error": lobe.error}
-    if seen is not None and surfaces.reflectance.any():
+    if seen is not None and (surfaces.reflectance.any() or surfaces.mirrored.any()):
         bounces = mirrored_bounces(surfaces, caster, _sampling(settings), rows, seen, lobe)
         matrices = sh.rotate((yield from scaled(bounces, 0.8, 0.1)), frame.T)
         if matrices.any():

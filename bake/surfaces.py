@@ -17,6 +17,9 @@ LIFT = 1e-4
 INWARDS = 0.01
 # A triangle is cut into at most so many by so many.
 _MOST_CUTS = 64
+# Lobes that reflect no more than this at normal incidence, on average over the channels, count as scattered: those of
+# dielectrics, commonly 0.04. Nearly every metal reflects more.
+LEAST_MIRRORED = 0.1
 # Where in a triangle its colour is looked up: four points a side's worth, as barycentric coordinates.
 _SPOTS = np.array([(i + 1, j + 1, 4 - i - j) for i in range(4) for j in range(4 - i)]) / 6.0
 
@@ -28,7 +31,9 @@ class Surfaces:
     corners: Array  # (T, 3, 3) float64, world space
     triangle_vertices: Array  # (T, 3) int64: rows of the vertex arrays
     facing: Array  # (T, 3) float64: unit normal of each triangle, on the side of its vertices' normals
-    reflectance: Array  # (T, channels) float64, 0..1: as if scattered; one channel where all is grey
+    reflectance: Array  # (T, channels) float64, 0..1: what is scattered; one channel where all is grey
+    mirrored: Array  # (T, channels) float64, 0..1: what a lobe reflects at normal incidence, where it is told apart
+    roughness: Array  # (T,) float64, 0..1: of that lobe
     blocks: Array  # (T,) bool: takes part in shadows
     positions: Array  # (V, 3) float64, world space, lifted off the surface: where rays start
     normals: Array  # (V, 3) float64, world space, unit
@@ -88,16 +93,17 @@ def gather(scene: Scene, bake: frozenset[Hashable], cuts: int = 0) -> Surfaces:
         corners, positions, normals = _placed(mesh, instance.world_from_object, first, vertices)
         facing = _facing(corners, normals[vertices.reshape(-1, 3)])
         blocks = np.full(len(corners), bool(instance.visibility & Visibility.SHADOW))
-        colour = _reflectance(mesh, instance, scene)
-        parts.append((corners, count + vertices.reshape(-1, 3), facing, colour, blocks, positions, normals))
+        look = _look(mesh, instance, scene)
+        parts.append((corners, count + vertices.reshape(-1, 3), facing, *look, blocks, positions, normals))
         runs[instance.key] = slice(count, count + len(first))
         count += len(first)
     if not parts:
         raise ValueError("the scene has no surface that blocks light and none to bake")
-    corners, rows, facing, colour, blocks, positions, normals = (np.concatenate(p) for p in zip(*parts, strict=True))
-    if (colour == colour[:, :1]).all():
-        colour = colour[:, :1]
-    surfaces = Surfaces(corners, rows, facing, colour, blocks, positions, normals, runs)
+    arrays = [np.concatenate(part) for part in zip(*parts, strict=True)]
+    corners, rows, facing, colour, mirrored, roughness, blocks, positions, normals = arrays
+    if (colour == colour[:, :1]).all() and (mirrored == mirrored[:, :1]).all():
+        colour, mirrored = colour[:, :1], mirrored[:, :1]
+    surfaces = Surfaces(corners, rows, facing, colour, mirrored, roughness, blocks, positions, normals, runs)
     return _cut(surfaces, cuts) if cuts else surfaces
 
 
@@ -134,6 +140,8 @@ def _cut(surfaces: Surfaces, cuts: int) -> Surfaces:
         triangle_vertices=rows,
         facing=surfaces.facing[source],
         reflectance=surfaces.reflectance[source],
+        mirrored=surfaces.mirrored[source],
+        roughness=surfaces.roughness[source],
         blocks=surfaces.blocks[source],
     )
 
@@ -173,25 +181,35 @@ def _facing(corners: Array, normals: Array) -> Array:
     return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
 
 
-def _reflectance(mesh: Mesh, instance: Instance, scene: Scene) -> Array:
-    """(T, 3): the part of light that each triangle gives back, a texture averaged over it.
+def _look(mesh: Mesh, instance: Instance, scene: Scene) -> tuple[Array, Array, Array]:
+    """(T, 3) what each triangle scatters, (T, 3) what its lobe reflects, (T,) roughness; a texture averaged over it.
 
-    What a lobe reflects is in it as if it were scattered, by its reflectance at normal incidence: its direction is
+    A lobe that is not told apart is in what is scattered, by its reflectance at normal incidence: its direction is
     lost, its energy is not.
     """
-    colours = np.zeros((mesh.triangle_count, 3))
+    colours, mirrored = np.zeros((2, mesh.triangle_count, 3))
+    roughness = np.zeros(mesh.triangle_count)
     if not instance.visibility & Visibility.BOUNCE:
-        return colours
+        return colours, mirrored, roughness
     for slot, first, count in mesh.slots:
         material = scene.materials[instance.materials[min(slot, len(instance.materials) - 1)]]
         run = slice(first, first + count)
-        colours[run] = material.base_color if material.base_color_texture is None else 0.0
+        base, specular = np.broadcast_to(material.base_color, (count, 3)), np.array(material.specular)
         if material.base_color_texture is not None:
-            colours[run] = _averages(mesh, run, material, scene.images)
-        scattered = (1.0 - material.metallic) * (1.0 - material.layered * np.array(material.specular))
-        colours[run] *= scattered + material.metallic
-        colours[run] += (1.0 - material.metallic) * np.array(material.specular)
-    return colours.clip(0.0, 1.0)
+            base = _averages(mesh, run, material, scene.images)
+        colours[run] = base * (1.0 - material.metallic) * (1.0 - material.layered * specular)
+        mirrored[run] = base * material.metallic + (1.0 - material.metallic) * specular
+        roughness[run] = material.roughness
+    scattered = mirrored.mean(axis=1, keepdims=True) <= LEAST_MIRRORED
+    colours += np.where(scattered, mirrored, 0.0)
+    return colours.clip(0.0, 1.0), np.where(scattered, 0.0, mirrored).clip(0.0, 1.0), roughness
+
+
+def is_mirror(material: Material) -> bool:
+    """Whether its lobe is told apart, at least somewhere."""
+    base = np.array(material.base_color if material.base_color_texture is None else (1.0, 1.0, 1.0))
+    lobe = base * material.metallic + (1.0 - material.metallic) * np.array(material.specular)
+    return bool(lobe.mean() > LEAST_MIRRORED)
 
 
 def _averages(mesh: Mesh, run: slice, material: Material, images: Mapping[Hashable, Image]) -> Array:

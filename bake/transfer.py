@@ -5,7 +5,8 @@ and taken off the exact cosine lobe. A vertex that sees all of its hemisphere is
 what the same directions took away: where everything reflects everything, a constant sky gives 1 whatever their number.
 
 The vector of a vertex times the coefficients of the light is its irradiance / pi: the albedo of the vertex itself is
-not in it. Light that comes by way of other surfaces has their diffuse reflectance in it, once a bounce.
+not in it. Light that comes by way of other surfaces has what they reflect in it, once a bounce: what they scatter, and
+what their lobes send this way (``mirrors``).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from . import lobes, sh
+from .mirrors import AtMirrors, Mirrors
 from .occlusion import Caster
 from .sphere import Array, spread
 from .surfaces import Surfaces
@@ -56,6 +58,15 @@ class Blocked:
     triangles: Array  # (n,) int32: row of Surfaces' triangles, -1 for the back of one: it blocks and reflects nothing
     u: Array  # (n,) float32
     v: Array  # (n,) float32
+
+
+@dataclass(frozen=True, eq=False)
+class Lit:
+    """What light, of some number of bounces, arrives where rays may look: all that surfaces pass on follows from it."""
+
+    transfer: Array  # (V, channels, bands²) float32
+    mirrors: Mirrors | None = None  # None where no lobe is told apart
+    matrices: Array | None = None  # (G, result², channels, bands²) float32, of the mirrors' vertices
 
 
 def cosine_vectors(normals: Array, bands: int) -> Array:
@@ -98,16 +109,20 @@ def shares(surfaces: Surfaces, blocked: Blocked, directions: Array) -> Array:
     return cosines * (4.0 / len(directions))
 
 
-def reflected(surfaces: Surfaces, blocked: Blocked, transfer: Array) -> Array:
-    """(n, channels, bands²): the transfer vector of what each blocked ray sees, its reflectance included."""
-    seen = blocked.triangles >= 0
-    triangles = blocked.triangles[seen]
-    corners = surfaces.triangle_vertices[triangles]
-    u, v = blocked.u[seen, None, None], blocked.v[seen, None, None]
-    at = (1 - u - v) * transfer[corners[:, 0]] + u * transfer[corners[:, 1]] + v * transfer[corners[:, 2]]
+def reflected(surfaces: Surfaces, blocked: Blocked, directions: Array, lit: Lit) -> Array:
+    """(n, channels, bands²): the transfer vector of what each blocked ray sees, what the surface reflects included."""
+    seen = np.nonzero(blocked.triangles >= 0)[0]
+    triangles, u, v = blocked.triangles[seen], blocked.u[seen], blocked.v[seen]
+    corners, across, along = surfaces.triangle_vertices[triangles], u[:, None, None], v[:, None, None]
+    at = (1 - across - along) * lit.transfer[corners[:, 0]]
+    at += across * lit.transfer[corners[:, 1]] + along * lit.transfer[corners[:, 2]]
     channels = surfaces.reflectance.shape[1]  # light that was not reflected yet has one for all
-    found = np.zeros((len(blocked.vertices), channels, transfer.shape[2]), np.float32)
+    found = np.zeros((len(blocked.vertices), channels, lit.transfer.shape[2]), np.float32)
     found[seen] = at * surfaces.reflectance[triangles][:, :, None]
+    if lit.mirrors is not None and lit.matrices is not None:
+        shiny = lit.mirrors.told_apart(triangles)
+        towards = directions[blocked.directions[seen[shiny]]]
+        found[seen[shiny]] += lit.mirrors.seen(triangles[shiny], u[shiny], v[shiny], towards, lit.matrices)
     return found
 
 
@@ -127,17 +142,32 @@ def diffuse(
     """Transfer vectors (V, channels, bands²) float32 of all vertices, for light along the world's axes.
 
     Closing the generator ends the bake. With no bounces only ``rows``, ascending, are looked at; the others stay as
-    they are without shadows. With bounces all vertices are, as any may be what a ray sees, and the rays that hit
-    something are kept: 20 bytes each, commonly a fifth of V * directions / 2.
+    they are without shadows. With bounces all vertices are, as any may be what a ray sees.
     """
     everything = np.arange(len(surfaces.positions))
     rows = everything if rows is None or sampling.bounces else rows
+    return (yield from _bounced(surfaces, caster, sampling, rows, sampling.bounces)).transfer
+
+
+def passed_on(surfaces: Surfaces, caster: Caster, sampling: Sampling) -> Generator[Progress, None, Lit]:
+    """The same with what arrives at surfaces whose lobes are told apart, for rays to look at. Needs shadows."""
+    rows = np.arange(len(surfaces.positions))
+    return (yield from _bounced(surfaces, caster, sampling, rows, sampling.bounces + 1))
+
+
+def _bounced(
+    surfaces: Surfaces, caster: Caster, sampling: Sampling, rows: Array, looked_at: int
+) -> Generator[Progress, None, Lit]:
+    """What arrives after the bounces. Rays look at that of the first ``looked_at`` of 0, 1, ... bounces.
+
+    Rays that hit something are kept: 20 bytes each, commonly a fifth of V * directions / 2.
+    """
     first = cosine_vectors(surfaces.normals, sampling.bands)
-    channels = surfaces.reflectance.shape[1] if sampling.bounces and sampling.shadows else 1
     if not sampling.shadows:
-        return first[:, None, :].astype(np.float32)
+        return Lit(first[:, None, :].astype(np.float32))
     directions = spread(sampling.directions)
     basis = sh.evaluate(directions, sampling.bands)
+    gathered = AtMirrors(surfaces, sampling.bands, directions) if looked_at and surfaces.mirrored.any() else None
     passes = sampling.bounces + 1
     work = pieces(rows, sampling.directions)
     kept: list[Blocked | None] = []
@@ -149,19 +179,25 @@ def diffuse(
         place = np.searchsorted(piece, blocked.vertices), blocked.directions
         lost[place] = shares(surfaces, blocked, directions)
         first[piece] -= lost @ basis
+        if gathered is not None:
+            gathered.add_sky(piece, blocked.vertices, blocked.directions)
         room -= len(blocked.vertices)
         kept.append(blocked if sampling.bounces and room >= 0 else None)
+    channels = surfaces.reflectance.shape[1] if sampling.bounces else 1
     direct = np.repeat(first[:, None, :], channels, axis=1).astype(np.float32)
-    total = direct
+    total = Lit(direct) if gathered is None else Lit(direct, gathered.mirrors, gathered.direct)
     for bounce in range(sampling.bounces):
-        following = direct.copy()
+        following, needed = direct.copy(), gathered if bounce + 1 < looked_at else None
+        matrices = None if needed is None else needed.start(channels)
         for done, (piece, found) in enumerate(zip(work, kept, strict=True)):
             yield Progress((bounce + 1 + done / len(work)) / passes, f"bounce {bounce + 1} of {sampling.bounces}")
             blocked = found or trace(surfaces, caster, piece, directions, True)
-            light = reflected(surfaces, blocked, total)
+            light = reflected(surfaces, blocked, directions, total)
+            if needed is not None and matrices is not None:
+                needed.add(matrices, piece, blocked.vertices, blocked.directions, light)
             light *= shares(surfaces, blocked, directions)[:, None, None]
             following[piece] += sum_by_vertex(light, blocked, piece)
-        total = following
+        total = Lit(following, total.mirrors if needed else None, matrices)
     return total
 
 

@@ -44,7 +44,20 @@ def weights(reflections: Reflections, bands: int, roughnesses: Sequence[float], 
 
 
 def ggx(roughness: float, cosine: float) -> tuple[Array, Array]:
-    """A GGX mirror, alpha the square of ``roughness``.
+    """A GGX mirror, alpha the square of ``roughness``."""
+    out, shares, _ = _visible(roughness, cosine)
+    return _above(out, shares)
+
+
+def ggx_albedo(roughness: float, cosine: float) -> tuple[float, float]:
+    """What it reflects of even light by one bounce, and the part of that which Schlick's (1 - cosine)^5 gets."""
+    out, shares, facing = _visible(roughness, cosine)
+    shares = np.where(out[:, 2] > 0.0, shares, 0.0)
+    return float(shares.sum()), float(shares @ (1.0 - facing) ** 5)
+
+
+def _visible(roughness: float, cosine: float) -> tuple[Array, Array, Array]:
+    """Mirrored directions (n, 3), shares (n,) of 1 and the cosine of each facet to the view.
 
     Integrated over visible normals (Dupuy, Benyoub 2023), with the height-correlated shadowing of the frame's own lobe.
     """
@@ -56,10 +69,11 @@ def ggx(roughness: float, cosine: float) -> tuple[Array, Array]:
     cap, steps = _cap(-stretched[2])
     normals = (cap + stretched) * [alpha, alpha, 1.0]
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    out = 2.0 * (normals @ view)[:, None] * normals - view
+    facing = normals @ view
+    out = 2.0 * facing[:, None] * normals - view
     lost = _smith(cosine, alpha)
     shares = steps * (1.0 + lost) / (1.0 + lost + _smith(np.maximum(out[:, 2], 1e-6), alpha))
-    return _above(out, shares)
+    return out, shares / steps.sum(), facing.clip(0.0, 1.0)
 
 
 def phong_exponent(roughness: float) -> float:

@@ -18,7 +18,7 @@ from .occlusion import Caster
 from .separable import Separable, tangents
 from .sphere import Array, cube_directions, cube_solid_angles, spread
 from .surfaces import Surfaces
-from .transfer import Blocked, Progress, Sampling, pieces, reflected, trace
+from .transfer import Blocked, Lit, Progress, Sampling, pieces, reflected, trace
 
 # Rows of a lobe leave out so many times the energy that others do: they are a third of the size for it, and what their
 # few products leave out of the lobe is more.
@@ -88,15 +88,15 @@ def lobe_factors(normals: Array, lobe: Separable, at: Array, directions: Array) 
 
 
 def mirrored_bounces(
-    surfaces: Surfaces, caster: Caster, sampling: Sampling, rows: Array, lit: Array, lobe: Separable
+    surfaces: Surfaces, caster: Caster, sampling: Sampling, rows: Array, lit: Lit, lobe: Separable
 ) -> Generator[Progress, None, Array]:
     """(len(rows), channels, 1 + K, bands²) float32: what the surfaces around each vertex add to its matt side and to
-    each row of its lobe, along the world's axes. ``lit``: diffuse transfer of all vertices, a bounce less.
+    each row of its lobe, along the world's axes. ``lit``: a bounce less.
     """
     directions = spread(sampling.directions)
     weight = 4.0 * np.pi / sampling.directions
     channels = surfaces.reflectance.shape[1]
-    total = np.zeros((len(rows), channels, 1 + len(lobe.orders), lit.shape[2]), np.float32)
+    total = np.zeros((len(rows), channels, 1 + len(lobe.orders), lit.transfer.shape[2]), np.float32)
     work, done = pieces(rows, sampling.directions), 0
     for piece in work:
         yield Progress(done / len(rows), "reflections of bounces")
@@ -106,13 +106,13 @@ def mirrored_bounces(
     return total
 
 
-def _sums(surfaces: Surfaces, blocked: Blocked, rows: Array, directions: Array, lit: Array, lobe: Separable) -> Array:
+def _sums(surfaces: Surfaces, blocked: Blocked, rows: Array, directions: Array, lit: Lit, lobe: Separable) -> Array:
     """(len(rows), channels, 1 + K, bands²) sums over the rays, one product a vertex."""
     towards, normals = directions[blocked.directions], surfaces.normals[blocked.vertices]
     cosines = (normals * towards).sum(axis=1)[:, None] / np.pi
     at = np.searchsorted(rows, blocked.vertices)
     factors = np.concatenate([cosines, lobe_factors(surfaces.normals[rows], lobe, at, towards)], axis=1)
-    light = reflected(surfaces, blocked, lit)
+    light = reflected(surfaces, blocked, directions, lit)
     total = np.zeros((len(rows), light.shape[1], factors.shape[1], light.shape[2]), np.float32)
     starts = np.searchsorted(blocked.vertices, rows)
     for row, first, last in zip(range(len(rows)), starts, [*starts[1:], len(light)], strict=True):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rebound.bake import separable, sh
-from rebound.bake.glossy import open_matrices
 from rebound.bake.job import BakeSettings, Kind
 from rebound.bake.light import Surroundings
 from rebound.bake.live import make_live
+from rebound.bake.matrices import open_matrices
 from rebound.bake.refine import tree, walk
 from rebound.bake.sphere import quadrature
 from rebound.bake.surfaces import mesh_vertices

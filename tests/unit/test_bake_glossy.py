@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rebound.bake import haar, lobes, sh, sphere
-from rebound.bake.glossy import glossy, hemisphere, open_matrices, turn_matrices
+from rebound.bake.glossy import glossy
+from rebound.bake.matrices import hemisphere, open_matrices, turn_matrices
 from rebound.bake.surfaces import frame_of
 from rebound.bake.transfer import Sampling, diffuse, finish
 from rebound.bake.wavelets import wavelet
