@@ -70,8 +70,8 @@ BAKE_SETTINGS = (
         "bake_bounces",
         "INT",
         "Bounces",
-        "How often light goes on by way of other surfaces. More is brighter and truer in corners, at the cost of time; "
-        "at 0 there are shadows only",
+        "How often light goes on by way of other surfaces; metals mirror it on. More is brighter and truer in corners, "
+        "at the cost of time, and more of it where there is metal; at 0 there are shadows only",
         1,
         minimum=0,
         maximum=16,
