@@ -93,7 +93,7 @@ class Mirrors:
             cosines = -(normals[some] * towards[some]).sum(axis=1).clip(-1.0, 0.0)
             place = _Place(self._level[triangles[some]], cosines)
             lobe = self._lobes(place, normals[some], towards[some], cosines)
-            # A band-limited hemisphere is not 1 near its horizon: the same light from all of it comes back as it is.
+            # The same light from all of the hemisphere comes back as it is, between the normals of corners too.
             above = (parts[some, :, None] * self._above[rows[some]]).sum(axis=1)
             looks[some] = lobe / (lobe * above).sum(axis=1, keepdims=True).clip(0.5, 2.0)
             albedos[some] = self._reflected(place, triangles[some])
@@ -101,14 +101,18 @@ class Mirrors:
         return found * albedos[:, :, None]
 
     def _lobes(self, place: _Place, normals: Array, towards: Array, cosines: Array) -> Array:
-        """(n, result²): what coefficients of arriving radiance are multiplied with to be what is seen."""
+        """(n, result²): what coefficients of arriving radiance are multiplied with to be what is seen.
+
+        Seen with its image below the horizon: a band-limited lobe has no step there that some of it would fall into.
+        """
         across = cosines[:, None] * normals + towards
         length = np.linalg.norm(across, axis=1, keepdims=True)
         across = np.where(length > 1e-6, across / np.maximum(length, 1e-6), tangents(normals))
         table, total = place.of(self._weights), np.zeros((len(normals), self.bands**2))
         orders = sh.band_of(self.bands)
         for k, (along, _, up) in enumerate(plane_directions(self.bands)):
-            total += table[:, k, orders] * sh.evaluate(along * across + up * normals, self.bands)
+            over, under = along * across + up * normals, along * across - up * normals
+            total += table[:, k, orders] * (sh.evaluate(over, self.bands) + sh.evaluate(under, self.bands))
         return total
 
     def _reflected(self, place: _Place, triangles: Array) -> Array:
