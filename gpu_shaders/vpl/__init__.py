@@ -126,17 +126,18 @@ class Vpl:
         """Begin a picture that knows nothing of those before it."""
         self._picture = 0
         self.cache.forget()
+        self._sorted.pop(CACHE, None)  # nor do the points send anything
         self.gathering.forget()
 
     def _fill_pool(self, inputs: FrameInputs, settings: Mapping[str, Value]) -> Iterator[float]:
         """Choose this sample's virtual lights; the cache gathers and sends anew. Yields progress."""
         count, seed = int(settings["pool"]), inputs.noise_seed(1)
         tile = self.sources.tile_of(CACHE)
-        if tile is not None:
-            self.cache.emit(self.sources, tile)  # before they are sorted: points without light are left out
         for owner in self._indices:
             drawn = self.sources.points_drawn[owner], self.voxels.built
             if self._sorted.get(owner) != drawn:
+                if tile is not None and owner == CACHE:
+                    self.cache.emit(self.sources, tile)  # before they are sorted: points without light are left out
                 self._sort_points(owner)
                 self._sorted[owner] = drawn
         if tile is None:
@@ -150,8 +151,8 @@ class Vpl:
             self.pool.draw(self.sources, count, update, seed)
             candidates = self._candidates(inputs, settings, kinds=kinds, number=update)
             have_light = self.cache.gather(self.sources, tile, candidates, rows, glossy=inputs.gpu_scene.is_glossy)
-            if have_light or self.cache.settles:
-                self.cache.emit(self.sources, tile)
+            # Always, as the sky's part of what points send is told from what they gathered.
+            self.cache.emit(self.sources, tile)
             if have_light:
                 self._sort_points(CACHE)
             yield (number + 1) / rounds
