@@ -113,7 +113,13 @@ class TransferBake:
                     "Points, or subdivide it, to see shadows on it"
                 )
         if not self.pack:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            try:
+                self._folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise SceneError(
+                    f"No folder for bakes can be made at '{self._folder}' ({error.strerror}): save the .blend where "
+                    "there can be one, or turn on Pack"
+                ) from None
         return files
 
     def _hand_over(self) -> None:

@@ -55,6 +55,13 @@ def test_operator_bakes_the_selected_into_files_beside_the_blend(saved, tmp_path
     assert found.arrays["diffuse"].shape == (4, 3, 25)
 
 
+def test_folder_that_cannot_be_made_is_named_with_what_to_do(saved, tmp_path):
+    (tmp_path / "a.bakes").write_text("a file is in the way")
+    with pytest.raises(RuntimeError, match=r"(?s)a\.bakes' \(.*turn on Pack"):
+        bpy.ops.rebound.bake_transfer()
+    assert not baking.has_bake(floor())
+
+
 def test_coarse_mesh_is_warned_of(saved):
     lines = baking.bake([floor(), bpy.data.objects["Box"]], QUICK)
     assert len(lines) == 1 and "'Floor' has 4 vertices" in lines[0] and "subdivide" in lines[0]
