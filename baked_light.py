@@ -11,7 +11,7 @@ from .bake.light import Surroundings
 from .bake.live import Live, make_live
 from .bake.refine import tree
 from .bake.surfaces import frame_of, mesh_vertices
-from .bake.view_table import LOBES, weights
+from .bake.view_table import LOBES, least_roughness, weights
 from .device.interface import Device, Target
 from .gpu_scene import GpuScene
 from .gpu_shaders.frame.inputs import FrameInputs, LightTargets
@@ -108,7 +108,10 @@ class BakedLight:
             self._answered[instance.key] = question
             self.updates += 1
         place = (instance.mesh, instance.key, instance.transfer, instance.world_from_object, frame)
-        return self._objects.object(*place, bounces=live.bounces)
+        least = 0.0
+        if live.look is Look.HARMONICS and settings["widen"]:
+            least = least_roughness(LOBES[self._lobe], live.held(int(settings["bands"])))
+        return self._objects.object(*place, bounces=live.bounces, least_roughness=least)
 
     def _prepare(self, scene: Scene, instance: Instance) -> Live:
         """Have the mesh on the GPU and the bake laid out."""

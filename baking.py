@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import shutil
 import tempfile
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,8 @@ import numpy as np
 
 from .bake.job import BakeSettings, Kind
 from .bake.process import BakeProcess, Outcome
-from .bake.surfaces import mesh_vertices
+from .bake.surfaces import is_mirror, mesh_vertices
+from .bake.view_table import ggx, least_roughness
 from .bake_settings import BAKE_SETTINGS
 from .scene.changes import world_bounds
 from .scene.convert import convert_scene, is_own_surface
@@ -58,7 +59,7 @@ class TransferBake:
         self._folder = Path(tempfile.mkdtemp(prefix="rebound-packed-")) if pack else _folder_beside(self._blend)
         try:
             scene = convert_scene(depsgraph, for_viewport=True)
-            files = self._assign(scene, list(objects), warns=not settings.points)
+            files = self._assign(scene, list(objects), settings)
             self.process = BakeProcess(scene, files, settings)
         except BaseException:
             self._clean()
@@ -90,8 +91,8 @@ class TransferBake:
         self.process.close()
         self._clean()
 
-    def _assign(self, scene, objects: Sequence, *, warns: bool) -> dict[Hashable, Path]:
-        """Which file each object's instance goes to. ``warns``: of vertices that are not enough."""
+    def _assign(self, scene, objects: Sequence, settings: BakeSettings) -> dict[Hashable, Path]:
+        """Which file each object's instance goes to. Warns of what the bake will not show."""
         if not objects:
             raise SceneError("No object to bake: select some that have a surface")
         self._targets: list[_Target] = []
@@ -106,12 +107,7 @@ class TransferBake:
             target = _Target(uid, obj.name, self._folder / _file_name(obj.name, {t.file.name for t in self._targets}))
             self._targets.append(target)
             files[instance.key] = target.file
-            if warns and _is_coarse(scene, instance):
-                count = len(mesh_vertices(scene.meshes[instance.mesh])[0])
-                self.warnings.append(
-                    f"Object '{obj.name}' has {count} vertices: baked light is as fine as the mesh. Raise Detail "
-                    "Points, or subdivide it, to see shadows on it"
-                )
+            self.warnings += _not_shown(obj.name, scene, instance, settings)
         if not self.pack:
             try:
                 self._folder.mkdir(parents=True, exist_ok=True)
@@ -211,6 +207,9 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
         "WAVELET_GLOSSY": f"6 x {settings['texels']}² texels, {settings['keep']:.2%} of the energy",
     }[about["kind"]]
     lines = [f"{kind.label}: {detail}", f"{settings['directions']:,} directions, {settings['bounces']} bounces"]
+    if about["kind"] == "GLOSSY":
+        least = least_roughness(ggx, min(settings["bands"], settings["result_bands"]))
+        lines.append(f"Holds reflections of roughness {least:.2f} and more")
     if "points" in about:
         lines.append(f"{about['points']:,} points inside triangles, errors up to {about['detail_error']:.0%} are left")
     if "device" in about:
@@ -226,6 +225,25 @@ def facts(about: Mapping, nbytes: int) -> list[str]:
 def surfaces(objects: Iterable) -> list:
     """Those of the objects that may have a surface."""
     return [obj for obj in objects if obj.type in {"MESH", "CURVE", "SURFACE", "META", "FONT"}]
+
+
+def _not_shown(name: str, scene: Scene, instance: Instance, settings: BakeSettings) -> Iterator[str]:
+    """What a bake of the object ``name`` will lack, a line each with the remedy."""
+    if not settings.points and _is_coarse(scene, instance):
+        count = len(mesh_vertices(scene.meshes[instance.mesh])[0])
+        yield (
+            f"Object '{name}' has {count} vertices: baked light is as fine as the mesh. Raise Detail Points, or "
+            "subdivide it, to see shadows on it"
+        )
+    if settings.kind is Kind.GLOSSY:
+        bands = min(settings.bands, settings.result_bands)
+        metals = [scene.materials[m].roughness for m in instance.materials if is_mirror(scene.materials[m])]
+        least = least_roughness(ggx, bands)
+        if metals and min(metals) < least:
+            yield (
+                f"Object '{name}' has a roughness of {min(metals):.2f}, smoother than {bands} bands hold: with Widen "
+                f"Lobes its reflections are as of roughness {least:.2f}. Take Sharp, Glossy or more bands"
+            )
 
 
 def _is_coarse(scene: Scene, instance: Instance) -> bool:

@@ -161,6 +161,15 @@ SETTINGS = (
         ),
     ),
     Setting(
+        "transfer_widen",
+        "BOOL",
+        "Widen Lobes",
+        "Soft, Glossy bakes show surfaces that are smoother than their bands hold as the smoothest that they do hold: "
+        "without rings, but softer than they are. Off is sharper by a little, with black and coloured spots around "
+        "bright light",
+        True,
+    ),
+    Setting(
         "transfer_window",
         "FLOAT",
         "Window",

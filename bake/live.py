@@ -39,6 +39,10 @@ class Live:
         """
         raise NotImplementedError
 
+    def held(self, bands: int) -> int:
+        """Look.HARMONICS: bands of what is reflected, where ``bands`` at most are used of the light."""
+        raise NotImplementedError
+
     def coefficient(self, term: int, result: int) -> Array:
         """(vertices,) coefficient ``term`` of the transfer, the mean of its colours; of matrices in row ``result``.
 
@@ -67,6 +71,7 @@ class _Mixed:
     def __init__(self, transfer: Transfer) -> None:
         packed = glossy_matrices(Bake(transfer.about, transfer.arrays))
         channels, self.results, self._light = transfer.about["matrix"]
+        self.bands = round(self._light**0.5)  # of the light
         count, axes = packed.axes.shape[:2]
         every = np.concatenate([packed.means[:, None], packed.axes], axis=1).astype(np.float32)
         # (clusters, 1 + axes, channels, results, light)
@@ -111,6 +116,9 @@ class LiveGlossy(Live):
 
     def answer(self, light: Surroundings, frame: Array, bands: int, window: float, terms: int) -> Array:
         return self._matrices.answer(light, frame, bands, window)
+
+    def held(self, bands: int) -> int:
+        return min(bands, self._matrices.bands, round(self.coefficients**0.5))
 
     def coefficient(self, term: int, result: int) -> Array:
         return self._matrices.coefficient(term, result)

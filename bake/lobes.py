@@ -42,6 +42,17 @@ def cosine(bands: int) -> Array:
     return np.pi * phong(bands, 1.0)
 
 
+def narrowest(bands: int) -> float:
+    """The mean cosine to its axis of the narrowest lobe of so many bands that is nowhere negative.
+
+    Such a lobe is the square of a polynomial of the cosine, for even ``bands`` times 1 + cosine (Lukács), and its mean
+    cosine at most the largest node of Gauss' quadrature, or of Radau's with a node at -1 (Szegő 1939, chapter 7.7).
+    """
+    half = (bands + 1) // 2
+    series = [0.0] * half + ([1.0] if bands % 2 else [1.0, 1.0])  # P_half, or P_half + P_(half + 1)
+    return float(np.polynomial.legendre.legroots(series).real.max())
+
+
 def window(coefficients: Array, factors: Array) -> Array:
     """Multiply each band by its factor."""
     return coefficients * factors[band_of(band_count(coefficients))]

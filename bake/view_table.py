@@ -13,10 +13,11 @@ enough. How much is reflected is the material's matter.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
-from . import sh
+from . import lobes, sh
 from .sphere import Array
 
 Reflections = Callable[[float, float], tuple[Array, Array]]  # of a roughness 0..1 and the cosine of the view
@@ -41,6 +42,25 @@ def weights(reflections: Reflections, bands: int, roughnesses: Sequence[float], 
         # What grows with y is 0 in the plane, and in a lobe that is its own mirror image.
         found[:, :, order] = lobes[:, band] @ np.linalg.pinv(basis[:, band])
     return found
+
+
+@cache
+def least_roughness(reflections: Reflections, bands: int) -> float:
+    """The roughness whose lobe, seen along the normal, has the mean cosine of the narrowest that ``bands`` hold.
+
+    Cut off after so many bands, the lobe of a smoother one is far below 0 beside its highlight, and bright light there
+    shows as black or, channel by channel, as wrong colours. 1 where even that is narrower.
+    """
+
+    def mean_cosine(roughness: float) -> float:
+        towards, shares = reflections(roughness, 1.0)
+        return float(shares @ towards[:, 2])
+
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if mean_cosine(middle) > lobes.narrowest(bands) else (low, middle)
+    return high
 
 
 def ggx(roughness: float, cosine: float) -> tuple[Array, Array]:

@@ -175,21 +175,24 @@ def matt(stage: Stage, mask: np.ndarray, panoramas: dict[str, str]) -> dict:
 
 
 def shiny(stage: Stage, mask: np.ndarray, path: str) -> dict:
-    """Glossy harmonics over roughness, of each number of bands."""
+    """Glossy harmonics over roughness, of each number of bands: as they are shown, and without Widen Lobes."""
     stage.world(path, TURNS[1])
     references = {}
     for roughness in ROUGHNESS:
         stage.metal(roughness)
         references[roughness] = stage.picture("CYCLES")
-    found: dict[int, dict] = {}
+    found: dict[str, dict] = {"shiny": {}, "rings": {}}
     for bands in (3, 4, 5, 6):
         stage.metal(0.6)
         settings = BakeSettings(kind=Kind.GLOSSY, bands=bands, result_bands=bands, bounces=0, directions=512)
         baking.bake([stage.object], settings)
-        found[bands] = {}
-        for roughness in ROUGHNESS:
-            stage.metal(roughness)
-            found[bands][roughness] = error(references[roughness], stage.picture("REBOUND"), mask)
+        for part, widen in (("shiny", True), ("rings", False)):
+            found[part][bands] = {}
+            for roughness in ROUGHNESS:
+                stage.metal(roughness)
+                picture = stage.picture("REBOUND", transfer_widen=widen)
+                found[part][bands][roughness] = error(references[roughness], picture, mask)
+    stage.scene.rebound.transfer_widen = True
     return found
 
 
@@ -229,8 +232,9 @@ def content(found: dict) -> str:
         (PICTURES / "transfer_roughness.svg").write_text(svg, encoding="utf-8")
         parts.append("![Error against roughness](images/transfer_roughness.svg)\n")
         head = ["bands", *(f"roughness {r}" for r in ROUGHNESS)]
-        rows = [[b, *(significant(by[str(r)]) for r in ROUGHNESS)] for b, by in found["shiny"].items()]
-        parts.append(Table("Glossy harmonics: relmse of the metal object", head, rows).markdown())
+        for part, title in (("shiny", "relmse of the metal object"), ("rings", "relmse without Widen Lobes")):
+            rows = [[b, *(significant(by[str(r)]) for r in ROUGHNESS)] for b, by in found[part].items()]
+            parts.append(Table(f"Glossy harmonics: {title}", head, rows).markdown())
     if "matt" in found:
         rows = [
             [name, *(f"{significant(by['object'][b])} / {significant(by['all'][b])}" for b in by["object"])]
@@ -271,7 +275,7 @@ def main() -> None:
         if not words or "matt" in words:
             found["matt"] = matt(stage, mask, {n: str(worlds / f"{n}.exr") for n in ("courtyard", "interior")})
         if not words or "shiny" in words:
-            found["shiny"] = shiny(stage, mask, str(worlds / "courtyard.exr"))
+            found |= shiny(stage, mask, str(worlds / "courtyard.exr"))
         if not words or "sharp" in words:
             found["sharp"] = sharp(stage, Path(folder))
         RESULTS.parent.mkdir(exist_ok=True)

@@ -19,7 +19,8 @@ ROOT = str(Path(__file__).parent)
 SHIPPED = ("Draft", "Balanced", "High", "Final")  # quickest first
 # What is no matter of quality.
 NOT_KEPT = {"seed", "show", "show_light", "show_term", "show_result"}
-NOT_KEPT |= {"transfer_use", "transfer_bands", "transfer_terms", "transfer_lobe", "transfer_window"}
+NOT_KEPT |= {"transfer_use", "transfer_bands", "transfer_terms", "transfer_lobe"}
+NOT_KEPT |= {"transfer_widen", "transfer_window"}
 
 
 def shipped_file(name: str) -> Path:

@@ -56,6 +56,7 @@ class BakedObject:
     light: _Light
     tree: Texture | None  # where light has points inside triangles
     has: int  # HAS_... bits of frame.inputs
+    least_roughness: float  # Look.HARMONICS: smoother surfaces are seen by the lobe of this
 
 
 class BakedObjects:
@@ -122,13 +123,15 @@ class BakedObjects:
         frame: np.ndarray,
         *,
         bounces: bool,
+        least_roughness: float = 0.0,
     ) -> BakedObject:
         """Of a mesh and a light that were told before, and a tree if it was. ``bounces``: whether the bake has light
         that bounced.
         """
         of_vertices = self._lights[light]
         has = HAS_SKY | HAS_SKY_MIRRORED * (of_vertices.look is not Look.MATT) | HAS_SKY_BOUNCES * bounces
-        return BakedObject(world_from_object, frame, self._meshes[mesh], of_vertices, self._trees.get(tree), has)
+        vertices, cuts = self._meshes[mesh], self._trees.get(tree)
+        return BakedObject(world_from_object, frame, vertices, of_vertices, cuts, has, least_roughness)
 
     def keep(self, meshes: set[Hashable], lights: set[Hashable], trees: set[Hashable]) -> None:
         """Give everything else back."""
@@ -176,6 +179,7 @@ class BakedObjects:
                 "row": ROW_TEXELS // light.texels,
                 "texels": light.texels,
                 "coefficients": light.coefficients,
+                "least_roughness": one.least_roughness,
             }
             given: dict[str, Any] = {} if one.tree is None else {"tree_tx": one.tree}
             if light.look is not Look.MATT:

@@ -27,14 +27,15 @@ void prt_weights(float roughness, float cosine, out vec4 weights[PRT_TEXELS])
   }
 }
 
-/* What the harmonics of the arriving radiance are multiplied with to be what is seen, along the bake's axes. */
+/* What the harmonics of the arriving radiance are multiplied with to be what is seen, along the bake's axes. No lobe is
+ * narrower than what their bands hold (least_roughness() in bake/view_table.py). */
 void prt_seen(PrtSurface surface, mat3 local, out float seen[SH_MOST])
 {
   vec3 across = surface.cosine * surface.N - surface.V; /* away from the view, along the surface */
   float size = length(across);
   across = size > 1e-6 ? across / size : vec3(0.0);
   vec4 weights[PRT_TEXELS];
-  prt_weights(surface.specular.a, surface.cosine, weights);
+  prt_weights(max(surface.specular.a, prt_draw.least_roughness), surface.cosine, weights);
   for (int i = 0; i < SH_MOST; i++) {
     seen[i] = 0.0;
   }

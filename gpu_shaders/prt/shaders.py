@@ -38,6 +38,7 @@ PRT_DRAW = Struct(
     row="int",  # vertices in a row of the texture
     texels="int",  # of a vertex
     coefficients="int",  # of one vertex
+    least_roughness="float",  # Look.HARMONICS: of bake.view_table.least_roughness
 )
 
 _DEFINES = {

@@ -1,6 +1,7 @@
 """Baking light transfer of Blender's objects: the operator, its modal, files, what is stale, and the command line."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import pytest
 
 from rebound import baking
 from rebound.bake.file import read_bake
-from rebound.bake.job import BakeSettings
+from rebound.bake.job import BakeSettings, Kind
 from rebound.bake.process import Outcome
 from rebound.operators import bake_command
 from rebound.operators.bake_transfer import REBOUND_OT_bake_transfer
@@ -65,6 +66,19 @@ def test_folder_that_cannot_be_made_is_named_with_what_to_do(saved, tmp_path):
 def test_coarse_mesh_is_warned_of(saved):
     lines = baking.bake([floor(), bpy.data.objects["Box"]], QUICK)
     assert len(lines) == 1 and "'Floor' has 4 vertices" in lines[0] and "subdivide" in lines[0]
+
+
+def test_metal_smoother_than_its_bands_is_warned_of(saved):
+    """Of the kind that shows it softer, and named with what it is shown as."""
+    shader = bpy.data.materials["Red"].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Metallic"].default_value, shader.inputs["Roughness"].default_value = 1.0, 0.3
+    settings = replace(QUICK, kind=Kind.GLOSSY, bands=5, result_bands=6)
+    lines = [line for line in baking.bake([floor()], settings) if "roughness" in line]
+    assert len(lines) == 1
+    assert "'Floor' has a roughness of 0.30, smoother than 5 bands hold" in lines[0] and "0.57" in lines[0]
+    assert "Holds reflections of roughness 0.57 and more" in [text for text, _ in state_lines(floor())]
+    shader.inputs["Roughness"].default_value = 0.6
+    assert not any("roughness" in line for line in baking.bake([floor()], settings))
 
 
 def test_points_inside_triangles_show_the_shadow_on_a_square(saved, tmp_path):

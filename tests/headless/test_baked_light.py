@@ -13,11 +13,13 @@ from rebound.bake.matrices import open_matrices
 from rebound.bake.refine import tree, walk
 from rebound.bake.sphere import quadrature
 from rebound.bake.surfaces import mesh_vertices
+from rebound.bake.view_table import LOBES, least_roughness
 from rebound.scene.data import Material, Visibility, World
 from rebound.tests.support.bake_scenes import grid
 from rebound.tests.support.baked_scenes import baked
 from rebound.tests.support.brdf_reference import ggx_values, phong_values
 from rebound.tests.support.glsl_functions import evaluate
+from rebound.tests.support.panorama_scenes import directions_of, lit_by
 from rebound.tests.support.render_scenes import EVERYTHING, Studio, light, ortho, perspective, place, scene, sphere
 
 SKY = World((1.0, 0.8, 0.5))
@@ -119,19 +121,43 @@ def test_mirror_of_a_white_sky_is_white(studio):
 
 
 @pytest.mark.parametrize(("lobe", "values"), [("GGX", ggx_values), ("PHONG", phong_values)])
-@pytest.mark.parametrize("roughness", [0.35, 0.6])
-def test_mirrored_light_is_the_lobe_summed_over_what_arrives(studio, lobe, values, roughness):
-    """A metal ball under a white sky, pixel by pixel: six bands of the open half space, through the lobe."""
+@pytest.mark.parametrize(("roughness", "widen"), [(0.35, False), (0.35, True), (0.6, True)])
+def test_mirrored_light_is_the_lobe_summed_over_what_arrives(studio, lobe, values, roughness, widen):
+    """A metal ball under a white sky, pixel by pixel: six bands of the open half space, through the lobe.
+
+    Widened where they hold none so narrow.
+    """
     metal = Material("Metal", (1.0, 1.0, 1.0), metallic=1.0, roughness=roughness)
     alone = scene([sphere("ball", (0, 0, 0), 0.5, rings=48)], materials=[metal], world=World((1.0, 1.0, 1.0)))
     shown = baked(alone, replace(QUICK, kind=Kind.GLOSSY, bands=6, result_bands=6, error=0.001, bounces=0))
-    found = studio.render(shown, ortho(32, 32, 1.2), 1, ("glossy_direct",), method="NONE", transfer_lobe=lobe)
+    changed = {"method": "NONE", "transfer_lobe": lobe, "transfer_widen": widen}
+    found = studio.render(shown, ortho(32, 32, 1.2), 1, ("glossy_direct",), **changed)
+    shown_as = max(roughness, least_roughness(LOBES[lobe], 6)) if widen else roughness
     towards, areas = quadrature(200)
     arrives = sh.evaluate(towards, 6) @ open_matrices(np.array([[0.0, 0.0, 1.0]]), 6, 6)[0][:, 0] * np.sqrt(4 * np.pi)
     for pixel in range(17, 28):
         cosine = np.sqrt(1.0 - (((pixel + 0.5) / 32 * 1.2 - 0.6) / 0.5) ** 2 - (0.5 / 32 * 1.2 / 0.5) ** 2)
-        shares = values(towards, roughness, cosine) * areas
+        shares = values(towards, shown_as, cosine) * areas
         assert found["glossy_direct"][16, pixel, 0] == pytest.approx(shares @ arrives / shares.sum(), abs=0.01), pixel
+
+
+@pytest.mark.parametrize("used", [4, 6])
+def test_smooth_metal_beside_bright_light_has_no_dark_rings(studio, used):
+    """Under an even sky with a lamp of 15 degrees in it, a mirror reflects 1 where it does not reflect the lamp."""
+    towards, _ = directions_of(64)
+    lamp = towards @ np.array([0.6, 0.0, 0.8]) > np.cos(np.radians(15))
+    pixels = np.where(lamp, 40.0, 1.0)[..., None] * np.ones(3)
+    metal = Material("Metal", (1.0, 1.0, 1.0), metallic=1.0, roughness=0.3)
+    alone = lit_by(pixels, [sphere("ball", (0, 0, 0), 0.5, rings=32)], sun_threshold=0.0)
+    alone = replace(alone, materials=(metal,))
+    shown = baked(alone, replace(QUICK, kind=Kind.GLOSSY, bands=6, result_bands=6, error=0.002, bounces=0))
+    least = {}
+    for widen in (False, True):
+        changed = {"method": "NONE", "transfer_widen": widen, "transfer_bands": used}
+        found = studio.render(shown, ortho(32, 32, 1.2), 1, ("glossy_direct",), **changed)["glossy_direct"][..., 0]
+        least[widen] = found[np.hypot(*(np.mgrid[:32, :32] - 15.5)) < 11].min()
+    assert least[False] == 0.0
+    assert least[True] > 0.5
 
 
 @pytest.mark.parametrize("lobe", ["GGX", "PHONG"])

@@ -191,5 +191,16 @@ def test_window_takes_the_negative_ring_of_a_small_sun_away():
     assert soft.min() > -0.05 * soft.max()
 
 
+@pytest.mark.parametrize("bands", range(1, 10))
+def test_narrowest_lobe_is_one_that_is_nowhere_negative_and_no_other_is_narrower(bands):
+    """Of squares of polynomials, for even bands times 1 + cosine: the largest eigenvalue of the cosine."""
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    weights = weights * (1.0 if bands % 2 else 1.0 + nodes)
+    powers = np.polynomial.legendre.legvander(nodes, (bands - 1) // 2)
+    squares, means = (powers.T @ (w[:, None] * powers) for w in (weights, weights * nodes))
+    largest = np.linalg.eigvals(np.linalg.solve(squares, means)).real.max()
+    assert lobes.narrowest(bands) == pytest.approx(largest, abs=1e-9)
+
+
 def test_constant_function_needs_no_window():
     assert lobes.laplacian_strength(np.eye(25)[0], 0.5) == 0.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rebound.bake import sh, view_table
+from rebound.bake.lobes import narrowest
 from rebound.bake.sphere import quadrature
 from rebound.tests.support.brdf_reference import ggx_values, mirrored, phong_values
 
@@ -42,6 +43,30 @@ def test_smooth_lobes_are_the_mirror(lobe):
     for cosine in (1.0, 0.6, 0.3):
         right = sh.evaluate(mirrored(cosine), 6) @ LIGHT
         assert seen(view_table.LOBES[lobe], 0.05, cosine) == pytest.approx(right, abs=0.05)
+
+
+@pytest.mark.parametrize("lobe", list(view_table.LOBES))
+def test_least_roughness_is_as_wide_as_the_narrowest_lobe_of_its_bands(lobe):
+    reflections = view_table.LOBES[lobe]
+    found = [view_table.least_roughness(reflections, bands) for bands in range(2, 8)]
+    assert found == sorted(found, reverse=True)
+    assert found[0] == 1.0 and found[-1] < 0.6
+    for bands in (5, 6):
+        towards, shares = reflections(found[bands - 2], 1.0)
+        assert shares @ towards[:, 2] == pytest.approx(narrowest(bands), abs=1e-3)
+
+
+def test_lobe_of_the_least_roughness_rings_less_than_a_smoother_one():
+    """How far five bands of it go below 0, seen along the normal, in parts of its peak."""
+
+    def depth(roughness):
+        towards, shares = view_table.ggx(roughness, 1.0)
+        halves = np.concatenate([towards, towards * [1, -1, 1]])
+        values = sh.evaluate(TOWARDS, 5) @ (np.tile(shares, 2) @ sh.evaluate(halves, 5))
+        return -values.min() / values.max()
+
+    assert depth(view_table.least_roughness(view_table.ggx, 5)) < 0.03
+    assert depth(0.3) > 0.1
 
 
 def test_any_isotropic_brdf_can_be_asked_for_its_values():
