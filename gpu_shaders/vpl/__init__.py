@@ -60,7 +60,7 @@ class Vpl:
         self.voxels = Voxels(device)
         self.pool = Pool(device)
         self.cache = Cache(device)
-        self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device)}
+        self._indices = {CACHE: PointIndex(device), EMITTERS: PointIndex(device, covers=True)}
         self._sorted: dict[str, tuple[int, int]] = {}  # how often points were drawn and voxels built for each index
         self.gathering = Gathering(device)
         self._settings: Mapping[str, Value] = {}  # of the last sample

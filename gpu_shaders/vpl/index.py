@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...device.interface import Device, Target, Texture
+from ..frame.draws import ADD
 from ..frame.light_maps import MapTile
 from ..frame.voxels import VoxelGrid
-from .shaders import INDEX_CELLS, INDEX_SCATTER, INDEX_SPREAD
+from .shaders import COVER_SCATTER, INDEX_CELLS, INDEX_SCATTER, INDEX_SPREAD
 from .sources import Sources
 from .structs import INDEX_LEVELS
 
@@ -19,10 +20,10 @@ SPREAD = 3
 
 
 class PointIndex:
-    """The index of one tile of surface points."""
+    """The index of one tile of surface points; ``covers``: with how much of their surroundings they cover."""
 
-    def __init__(self, device: Device) -> None:
-        self.device = device
+    def __init__(self, device: Device, *, covers: bool = False) -> None:
+        self.device, self._covers = device, covers
         self._grids: list[tuple[Texture, Target]] = []  # the newest first
         self.places = ((0.0, 0.0, 0.0, 0.0),)  # of each level's cube: lower corner, cells a metre
         self._none = device.texture((1, 1), "RGBA32F")
@@ -32,8 +33,9 @@ class PointIndex:
         self._fit(len(grids))
         self.places = tuple((*grid.origin, INDEX_CELLS / (grid.edge * float(grid.size.max()))) for grid in grids)
         x, y, side, _ = sources.points_viewport(tile)
+        for _, target in self._grids:
+            self.device.clear(target)
         target = self._grids[0][1]
-        self.device.clear(target)
         names = ("position_area_tx", "normal_kind_tx", "flux_tx")
         points = {**dict(zip(names, sources.colors, strict=False)), "pc_origin": (x, y), "pc_side": side}
         for level, place in enumerate(self.places):
@@ -44,6 +46,12 @@ class PointIndex:
             for level in range(len(self.places)):
                 self.device.fullscreen(INDEX_SPREAD, target, viewport=_viewport(level), index_tx=old, pc_level=level)
             self._grids.reverse()
+        if self._covers:
+            del points["flux_tx"]
+            part = _viewport(len(grids))
+            with self.device.drawing(COVER_SCATTER, self._grids[0][1], state=ADD, viewport=part, **points) as draw:
+                for level, (place, grid) in enumerate(zip(self.places, grids, strict=True)):
+                    draw(count=27 * side * side, pc_index=place, pc_level=level, pc_voxel=grid.edge)
 
     @property
     def cubes(self) -> dict[str, tuple[float, ...]]:
@@ -51,7 +59,7 @@ class PointIndex:
         return {f"index_{level}": self.places[min(level, len(self.places) - 1)] for level in range(INDEX_LEVELS)}
 
     def _fit(self, levels: int) -> None:
-        size = (6 * INDEX_CELLS, INDEX_CELLS**2 * levels)
+        size = (6 * INDEX_CELLS, INDEX_CELLS**2 * (levels + self._covers))
         if self._grids and self._grids[0][0].size == size:
             return
         self._free_grids()

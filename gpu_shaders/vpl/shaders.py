@@ -321,6 +321,17 @@ INDEX_SCATTER = Shader(
     defines=_INDEX,
 )
 
+COVER_SCATTER = Shader(
+    name="vpl_cover_scatter",
+    vertex="vpl/vpl_cover_scatter_vert.glsl",
+    fragment="vpl/vpl_cover_scatter_frag.glsl",
+    varyings={"v_area": "flat VEC4"},
+    outputs={"out_area": "VEC4"},
+    samplers={"position_area_tx": "FLOAT_2D", "normal_kind_tx": "FLOAT_2D"},
+    constants={"pc_index": "VEC4", "pc_origin": "IVEC2", "pc_side": "INT", "pc_level": "INT", "pc_voxel": "FLOAT"},
+    defines=_INDEX,
+)
+
 INDEX_SPREAD = Shader(
     name="vpl_index_spread",
     fragment="vpl/vpl_index_spread_frag.glsl",
@@ -358,6 +369,7 @@ CACHE_EMIT = Shader(
 
 SHADERS = (
     INDEX_SCATTER,
+    COVER_SCATTER,
     INDEX_SPREAD,
     CACHE_FADE,
     *CACHE_GATHER.values(),

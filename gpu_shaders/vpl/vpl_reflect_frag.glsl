@@ -65,9 +65,10 @@ void main()
     return;
   }
   vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
-  ivec2 emitter = candidates_emitter(hit, direction);
+  float part;
+  ivec2 emitter = candidates_emitter(hit, direction, part);
   if (emitter.x >= 0) {
-    out_direct = vec4(weight * index_radiance(position_area_tx, flux_tx, emitter), 1.0);
+    out_direct = vec4(part * weight * index_radiance(position_area_tx, flux_tx, emitter), 1.0);
   }
   vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
   bool known;

@@ -1,0 +1,4 @@
+void main()
+{
+  out_area = v_area;
+}
