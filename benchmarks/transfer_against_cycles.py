@@ -233,7 +233,7 @@ def content(found: dict) -> str:
         parts.append("![Error against roughness](images/transfer_roughness.svg)\n")
         head = ["bands", *(f"roughness {r}" for r in ROUGHNESS)]
         for part, title in (("shiny", "relmse of the metal object"), ("rings", "relmse without Widen Lobes")):
-            rows = [[b, *(significant(by[str(r)]) for r in ROUGHNESS)] for b, by in found[part].items()]
+            rows = [[b, *(significant(by[str(r)]) for r in ROUGHNESS)] for b, by in found.get(part, {}).items()]
             parts.append(Table(f"Glossy harmonics: {title}", head, rows).markdown())
     if "matt" in found:
         rows = [

@@ -211,7 +211,7 @@ def test_passes_over_the_g_buffer_have_its_depths_to_the_bit(studio):
     light_texture = device.texture((2048, 4), "RGBA32F", np.ones((4, 2048, 4), np.float32))
     block = {
         "clip_from_world": clip, "world_from_object": matrix, "local_from_world": np.eye(4),
-        "eye": given["pc_eye"], "has": 1, "row": 2048, "texels": 1, "coefficients": 1,
+        "eye": given["pc_eye"], "has": 1, "row": 2048, "texels": 1, "coefficients": 1, "least_roughness": 0.0,
     }  # fmt: skip
     packed = PRT_DRAW.pack([block], for_uniform=True)
     state = DrawState(depth_test="EQUAL")
