@@ -166,9 +166,11 @@ vec3 candidates_carried(vec3 hit, vec3 direction, float far, vec3 noise, out boo
 /* Which part of what a ray along `direction` hit at `hit` an emitter covers whose points stand for `area` each: the area of
  * points in the cell and in the one behind it, as a surface may lie on the border of both, over the cell's. Small emitters
  * would else shine from all that lies near them. */
-float candidates_cover(vec3 hit, vec3 direction, int level, float voxel, float area)
+float candidates_cover(vec3 hit, vec3 direction, float area)
 {
-  int scale = cover_scale(area, voxel);
+  int level;
+  candidates_cube(hit, level);
+  int scale = cover_scale(area, voxel_edge_at(hit));
   ivec2 base = ivec2(0, vpl_frame.index_levels * INDEX_SIZE.y);
   ivec3 at = cover_cell(hit, scale);
   vec3 covered = vec3(0.0);
@@ -187,15 +189,14 @@ float candidates_cover(vec3 hit, vec3 direction, int level, float voxel, float a
 }
 
 /* Texel of the emitter's point that answers for what a ray along `direction` hit at `hit`, or -1: the hit must lie on its
- * plane, and no farther from it than the cells around it reach. `part`: how much of what was hit it is. */
-ivec2 candidates_emitter(vec3 hit, vec3 direction, out float part)
+ * plane, and no farther from it than the cells around it reach. */
+ivec2 candidates_emitter(vec3 hit, vec3 direction)
 {
   int level;
   vec4 cube = candidates_cube(hit, level);
   vec3 place = index_place(cube, hit);
   float edge = voxel_edge_at(hit);
   ivec2 answer = ivec2(-1);
-  float area = 1.0;
   for (int axis = 0; axis < 3; axis++) {
     int point = index_point(emitter_index_tx, level, place, index_side(axis, -direction[axis]));
     ivec2 texel = index_atlas_texel(vpl_frame.emitters, max(point, 0));
@@ -205,10 +206,8 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction, out float part)
     bool near = abs(dot(apart, n)) < CANDIDATES_VOXELS * edge &&
                 length(apart) < CANDIDATES_CELLS / cube.w + CANDIDATES_SPACING * sqrt(at.w);
     bool answers = point >= 0 && vpl_frame.emitters.z > 0.0 && dot(n, direction) < 0.0 && near;
-    area = answers && answer.x < 0 ? at.w : area;
     answer = answers && answer.x < 0 ? texel : answer;
   }
-  part = candidates_cover(hit, direction, level, edge, area);
   return answer;
 }
 
@@ -216,8 +215,7 @@ ivec2 candidates_emitter(vec3 hit, vec3 direction, out float part)
  * of it by the balance heuristic. */
 vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
 {
-  float part;
-  ivec2 texel = candidates_emitter(hit, direction, part);
+  ivec2 texel = candidates_emitter(hit, direction);
   if (texel.x < 0) {
     return vec3(0.0);
   }
@@ -228,7 +226,7 @@ vec3 candidates_emitted(vec3 P, vec3 N, vec3 hit, vec3 direction)
   float by_ray = dot(N, direction) * cosine / (MATH_PI * max(dot(to_hit, to_hit), 1e-20));
   float by_pool =
       float(vpl_frame.candidates) * candidates_probability(vpl_frame.emitter_tile, vpl_strength(flux)) / area;
-  return part * flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
+  return flux / (MATH_PI * area) * (by_ray / (by_ray + by_pool));
 }
 
 /* Radiance that the cache holds for what a receiver's ray hits, and how far that is, negative if it hits nothing. Where no

@@ -65,9 +65,9 @@ void main()
     return;
   }
   vec3 hit = origin + (far + 0.5 * voxel_grid.edge) * direction;
-  float part;
-  ivec2 emitter = candidates_emitter(hit, direction, part);
+  ivec2 emitter = candidates_emitter(hit, direction);
   if (emitter.x >= 0) {
+    float part = candidates_cover(hit, direction, texelFetch(position_area_tx, emitter, 0).w);
     out_direct = vec4(part * weight * index_radiance(position_area_tx, flux_tx, emitter), 1.0);
   }
   vec2 choice = sampling_r2(vpl_frame.number, sampling_hash(pixel, seed + 1));
